@@ -1,1 +1,1 @@
-"""Drivers of paddles, one per file; a file is found by its name."""
+"""Drivers, one per file. A driver has the name of its file."""

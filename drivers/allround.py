@@ -1,4 +1,4 @@
-"""Allround driver: guards the own goal and strikes at the open one, in games."""
+"""Driver of games that guards its own goal and shoots at the open goal."""
 
 from __future__ import annotations
 
@@ -11,20 +11,23 @@ from marl_airhockey.toolkit import Array, View, tactics
 
 @dataclass
 class Allround(tactics.Scripted):
-    """Driver that strikes a puck which it can get behind in time, and else guards."""
+    """Driver of games that guards its own goal and shoots at the open goal.
+
+    It strikes a puck if its paddle can be behind the puck in time.
+    """
 
     depth: float = 0.02
-    """Distance of the guarded line from the near edge of the reach (m)."""
+    """Distance of the guarded line from the near edge of the workspace, m."""
     ready: float = 0.07
-    """Distance of the waiting position from the own end (m)."""
+    """Distance of the waiting position from the own end, m."""
     gain: float = 16.0
-    """Commanded speed per distance (1/s)."""
+    """Commanded speed per distance to the target, 1/s."""
     patience: float = 0.3
-    """Time to a strike from which it waits instead (s)."""
+    """Time until a strike above which it waits instead, s."""
     brave: float = 1.6
-    """Speed of an approaching puck from which it guards (m/s)."""
+    """Speed of an approaching puck from which it guards, m/s."""
     shot: float = 1.0
-    """Share of its largest speed at which it strikes; below 1 its shots are soft."""
+    """Speed of a strike, as a share of its largest speed."""
 
     def act(
         self, view: View, memory: dict[str, Array]

@@ -1,4 +1,4 @@
-"""Gamepad of a person: the stick commands a velocity."""
+"""Driver of a person with a gamepad, whose stick commands a velocity."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from marl_airhockey.toolkit import Array, Driver, View
 
 DEAD = 0.12
-"""Dead zone, as a share of full tilt."""
+"""Dead zone of the stick, as a share of full tilt."""
 
 
 class Gamepad(Driver):
-    """Driver that commands the stick's velocity, ego frame; full tilt is top speed."""
+    """Driver of a person with a gamepad. Full tilt of the stick is the top speed."""
 
     needs_person = True
 
@@ -19,7 +19,7 @@ class Gamepad(Driver):
         self.stick = (0.0, 0.0)
 
     def push(self, x: float, y: float) -> None:
-        """Set the tilt of the stick: shares of full tilt, ego frame."""
+        """Set the tilt of the stick, share of full tilt, ego frame."""
         self.stick = (x, y)
 
     def rest(self) -> None:
@@ -30,7 +30,7 @@ class Gamepad(Driver):
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
         tilt = np.hypot(*self.stick)
-        # Speed grows from zero at the edge of the dead zone.
+        # The speed increases from 0 at the edge of the dead zone.
         live = max(min(tilt, 1.0) - DEAD, 0.0) / (1.0 - DEAD) / max(tilt, 1e-9)
         action = live * np.array(self.stick)
         return np.broadcast_to(action, (len(view.rng), 2)).copy(), memory

@@ -1,4 +1,4 @@
-"""Goalkeeper: stays between the puck and its own end."""
+"""Driver that stays between the puck and its own end."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from marl_airhockey.toolkit import Array, View, tactics
 
 @dataclass
 class Goalkeeper(tactics.Scripted):
-    """Driver that moves to where the nearest puck, banks included, crosses its line."""
+    """Driver that moves to the predicted crossing of its line by the nearest puck.
+
+    The prediction includes wall bounces.
+    """
 
     depth: float = 0.03
-    """Distance of the line from the near edge of the reach (m)."""
+    """Distance of the line from the near edge of the workspace, m."""
     gain: float = 8.0
-    """Commanded speed per distance (1/s)."""
+    """Commanded speed per distance to the target, 1/s."""
 
     def act(
         self, view: View, memory: dict[str, Array]

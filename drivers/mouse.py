@@ -1,4 +1,4 @@
-"""Mouse of a person: the paddle moves to the pointer."""
+"""Driver of a person with a mouse, whose paddle moves to the pointer."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from marl_airhockey.toolkit.pointing import point_to
 
 
 class Mouse(Driver):
-    """Driver that commands a velocity which ends at rest at a wanted position.
+    """Driver of a person with a mouse, whose paddle moves to the pointer.
 
     Args:
-        lag: time by which the paddle answers late, see `point_to`, s.
+        lag: Lag of the paddle, s, see `point_to`.
     """
 
     needs_person = True
@@ -20,14 +20,14 @@ class Mouse(Driver):
     def __init__(self, lag: float = 0.0) -> None:
         self._lag = lag
         self.target: tuple[float, float] | None = None
-        """Wanted position, ego frame, m; None without one."""
+        """Target position, ego frame, m; None for no target."""
 
     def aim(self, x: float, y: float) -> None:
-        """Set the wanted position, ego frame, m."""
+        """Set the target position, ego frame, m."""
         self.target = (x, y)
 
     def rest(self) -> None:
-        """Clear the wanted position: stand still."""
+        """Clear the target position; the paddle stops."""
         self.target = None
 
     def act(

@@ -1,4 +1,4 @@
-"""Random driver: a new random velocity at every step."""
+"""Driver with a new random velocity in every step."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from marl_airhockey.toolkit import Array, Driver, View
 
 
 class Random(Driver):
-    """Driver with actions uniform in the action box."""
+    """Driver with actions that are sampled uniformly from the action space."""
 
     erratic: ClassVar[bool] = True
 

@@ -1,4 +1,4 @@
-"""Reacher: moves to the goal, with its velocity if any; baseline of the reach tasks."""
+"""Driver that moves to the goal; baseline of the reach tasks."""
 
 from __future__ import annotations
 
@@ -12,23 +12,27 @@ from marl_airhockey.toolkit import Array, Driver, View, length
 
 @dataclass
 class Reacher(Driver):
-    """Driver to the goal, with a run-up from behind it for a wanted velocity.
+    """Driver that moves to the goal.
+
+    If the goal has a target velocity, the paddle starts a run-up from behind the goal.
 
     Raises:
-        ValueError: a scenario without a goal.
+        ValueError: The scenario has no goal.
     """
 
     needs_goal: ClassVar[bool] = True
     gain: float = 4.0
-    """Commanded speed per distance (1/s)."""
+    """Commanded speed per distance to the target, 1/s."""
     run_up: float = 0.22
-    """Time before the goal at which the run-up begins (s)."""
+    """Duration of the run-up before the goal, s."""
 
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
         if "goal" not in view.scenario_memory:
-            raise ValueError("reacher: this scenario has no goal to reach")
+            raise ValueError(
+                "reacher: this scenario has no goal; choose one with a goal"
+            )
         own = view.state.paddle[:, view.seat]
         top = view.top_speed[:, None]
         goal = view.scenario_memory["goal"]

@@ -1,4 +1,4 @@
-"""Shadow of a person's hand: the paddle follows one that a camera sees elsewhere."""
+"""Driver that follows a paddle in a person's hand, under a camera of its own."""
 
 from __future__ import annotations
 
@@ -21,25 +21,28 @@ from marl_airhockey.toolkit import (
 from marl_airhockey.toolkit.pointing import ARM_LAG, point_to
 
 CATCH = 0.08
-"""Distance from the paddle, m, within which a hand that comes into the picture must
-come before the paddle follows it"""
+"""Largest distance between hand and paddle at which the paddle starts to follow a hand
+that has entered the image, m."""
 
 
 class Shadow(Driver):
     """Driver that follows a paddle which a person moves under a camera of its own.
 
-    The field that this camera sees is stretched over the seat's reach. The paddle
-    *asks* for what brings it to where the hand is, within its limits, once the hand has
-    come to where the paddle is; with ``prescribe`` it *is* where the hand is, which
-    needs a simulated seat. A hand that leaves the picture leaves the paddle at rest.
+    The field of view of this camera is mapped to the seat's workspace. The driver
+    commands velocities toward the position of the hand, within the limits of the seat.
+    It starts when the hand has come to the position of the paddle. If the hand leaves
+    the image, the paddle stops.
+
+    With ``prescribe`` the driver is position-driven: the paddle has the position of the
+    hand. This needs a simulated seat.
 
     Args:
-        rig: file of the hand's camera, ``airhockey calibrate --hand`` writes it.
-        prescribe: whether the hand itself is the paddle.
-        lag: time by which the arm answers late, see `point_to`, s.
+        rig: File of the hand's camera, which ``airhockey calibrate --hand`` writes.
+        prescribe: True for a position-driven paddle.
+        lag: Lag of the arm, s, see `point_to`.
 
     Raises:
-        ValueError: no rig, or one that cannot be read.
+        ValueError: There is no such rig, or it cannot be read.
     """
 
     needs_person = True
@@ -61,7 +64,7 @@ class Shadow(Driver):
         return self
 
     def _open(self) -> Hand:
-        """Return the hand's camera; a copy of a driver gets one of its own."""
+        """Return the camera of the hand; a copy of the driver opens it again."""
         if self._hand is None:
             self._hand = Hand(self._rig).__enter__()
         return self._hand
@@ -71,7 +74,7 @@ class Shadow(Driver):
         hand = self._open()
         if hand.trouble or self._prescribe or self._caught:
             return hand.trouble
-        return "bring the hand's paddle to where the arm's is"
+        return "move the hand's paddle to the position of the arm's paddle"
 
     def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
         reach = np.asarray(seat.reach)
@@ -80,14 +83,14 @@ class Shadow(Driver):
         return {}
 
     def _target(self, motion: HandMotion) -> tuple[Array, Array]:
-        """Return place and velocity of the hand's paddle, stretched over the reach."""
+        """Return position, m, and velocity, m/s, of the hand in the workspace."""
         stretch = (self._high - self._low) / np.array(self._rig.size)
         middle = (self._high + self._low) / 2
         place = np.clip(middle + stretch * motion.place, self._low, self._high)
         return place, stretch * motion.velocity
 
     def measured(self) -> PrescribedMotion | None:
-        """Return (1, 4) where the hand's paddle is, if it prescribes; else None."""
+        """Return position and velocity of the hand (1, 4); None without `prescribe`."""
         if not self._prescribe:
             return None
         motion = self._open().read()

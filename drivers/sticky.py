@@ -1,4 +1,4 @@
-"""Sticky random driver: a random velocity held for some steps, to cover distance."""
+"""Driver with random velocities that it holds for several steps."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from marl_airhockey.toolkit import Array, Driver, RandomStreams, Seat, View
 
 @dataclass
 class Sticky(Driver):
-    """Driver with actions uniform in the action box, drawn every ``hold`` steps."""
+    """Driver that samples a uniform action every ``hold`` steps, to cover distance."""
 
     erratic: ClassVar[bool] = True
 
     hold: int = 10
-    """Number of steps that an action is held."""
+    """Number of steps for which an action is held."""
 
     def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
         return {"held": np.zeros((worlds, 2)), "age": np.zeros(worlds, np.int64)}

@@ -1,4 +1,4 @@
-"""Still driver: no motion, the baseline of every success rate."""
+"""Driver that never moves; baseline of every success rate."""
 
 from __future__ import annotations
 

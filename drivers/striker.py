@@ -1,4 +1,4 @@
-"""Striker: predicts the puck and strikes it at the target of the task."""
+"""Driver that predicts the puck and strikes it toward the target of the task."""
 
 from __future__ import annotations
 
@@ -11,22 +11,23 @@ from marl_airhockey.toolkit import Array, View, length, tactics
 
 @dataclass
 class Striker(tactics.Scripted):
-    """Driver that waits behind the predicted contact and strikes through it.
+    """Driver that predicts the puck and strikes it toward the target of the task.
 
-    It plays one puck at a time. It aims at the goal, at the first block, or straight up
-    the middle; in games, at the open goal. A puck at rest is struck in place.
+    The paddle waits behind the predicted contact and strikes through it, for one puck
+    at a time. The target is the goal, the centre of the blocks, or a point straight up
+    the centre. In games it is the open goal. A puck at rest is struck at its position.
     """
 
     meet_at: float = 0.22
-    """Distance from the near edge of the reach at which a falling puck is hit (m)."""
+    """Distance of the hit of a falling puck from the near edge of the workspace, m."""
     back: float = 0.07
-    """Distance behind the contact at which it waits (m)."""
+    """Distance behind the contact at which the paddle waits, m."""
     swing: float = 0.17
-    """Time before the contact at which it strikes (s)."""
+    """Time before the contact at which the strike begins, s."""
     pull: float = 0.94
-    """Acceleration of a falling puck that it assumes (m/s2)."""
+    """Assumed acceleration of a falling puck, m/s2."""
     gain: float = 9.0
-    """Commanded speed per distance (1/s)."""
+    """Commanded speed per distance to the target, 1/s."""
 
     def act(
         self, view: View, memory: dict[str, Array]
@@ -69,7 +70,7 @@ class Striker(tactics.Scripted):
         return action / top, memory
 
     def _play(self, view: View) -> Array:
-        """Strike, or wait at home, in a game on a level table."""
+        """Return the actions in a game on a level table: strike, or wait at home."""
         field, (pace, lag) = tactics.Field.of(view.scene, view.seat), self._skill
         aim = tactics.open_goal(view, field)
         strike, due = tactics.attack(view, field, aim, pace, lag)
@@ -81,9 +82,9 @@ class Striker(tactics.Scripted):
     def _predict(
         self, puck: Array, velocity: Array, line: float, half: float
     ) -> tuple[Array, Array]:
-        """Predict when (W,) and where (W, 2) a puck falls to a line, banks included.
+        """Predict when (W,), s, and where (W, 2), m, a puck falls to a line.
 
-        The puck's centre stays within ``half`` of the middle, m.
+        The prediction includes wall bounces: |y| of the puck is at most ``half``, m.
         """
         drop = np.maximum(puck[:, 0] - line, 0.0)
         speed = velocity[:, 0]

@@ -1,4 +1,4 @@
-"""UR5e in a seat of a simulated table: the paddle is where the arm's tool is."""
+"""Driver whose simulated paddle has the position of a UR5e's tool."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from marl_airhockey.toolkit import (
 )
 
 SILENT = 0.5
-"""Time without news from the arm after which it is an error, s"""
+"""Time without a message from the arm after which an error is raised, s."""
 
 
 class Ur5e(Driver):
-    """Driver whose paddle is where the tool of an arm is: a digital twin.
+    """Driver whose simulated paddle has the position of the tool of an arm.
 
-    Without a policy it moves nothing: a person leads the arm in freedrive, or another
-    driver commands it. With one, the policy's actions are sent to an emulated arm, in
-    real time, and the simulated paddle follows what the arm does. On a real arm
-    policies play with ``--backend real``, which watches the table, too.
+    Without a policy it only measures the arm: a person guides it in freedrive, or
+    another process commands it. With a policy, the actions are sent to an emulated arm
+    in real time, and the simulated paddle follows the arm. To use a policy on a real
+    arm, use ``--backend real``, which also observes the table.
 
     Args:
-        rig: File of a calibrated table, ``airhockey calibrate`` writes it.
-        host: Address of the controller, if there is no rig: ``airhockey ur-emulator``.
-        policy: Agent that commands an emulated arm; None moves nothing.
+        rig: File of a calibrated table, which ``airhockey calibrate`` writes.
+        host: Address of the controller without a rig, see ``airhockey ur-emulator``.
+        policy: Driver that commands an emulated arm; None to measure only.
 
     Raises:
-        ValueError: Neither a rig nor a host; a rig that cannot be read; a policy for an
-            arm that is not emulated.
+        ValueError: There is not exactly one of rig and host, the rig cannot be read, or
+            a policy is given for an arm that is not emulated.
     """
 
     needs_device = True
@@ -51,8 +51,8 @@ class Ur5e(Driver):
     ) -> None:
         if bool(rig) == bool(host):
             raise ValueError(
-                "ur5e: name a controller, host=127.0.0.5 (airhockey ur-emulator), or a "
-                "calibrated table, rig=rig.json"
+                "ur5e: expected either a controller, host=127.0.0.5 (airhockey "
+                "ur-emulator), or a calibrated table, rig=rig.json"
             )
         self._rig = Rig.load(Path(rig)) if rig else None
         self._host = self._rig.robot if self._rig else host
@@ -82,10 +82,10 @@ class Ur5e(Driver):
             self._policy.check(observation)
 
     def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
-        """Return the memory of the policy; connect to the arm at the first episode.
+        """Return the memory of the policy; connect to the arm in the first episode.
 
         Raises:
-            ValueError: Without a rig, the seat is no robot's.
+            ValueError: There is no rig, and the seat is not one of a robot.
         """
         self._reach = seat.reach
         if self._mounting is None:
@@ -119,10 +119,10 @@ class Ur5e(Driver):
         return f"robot: {self._robot.fault.label}"
 
     def measured(self) -> PrescribedMotion:
-        """Return (1, 4) position and velocity of the tool, as the arm reports them.
+        """Return position and velocity of the tool (1, 4), as the arm reports them.
 
         Raises:
-            RuntimeError: No controller answers, it is silent, or it has stopped.
+            RuntimeError: The controller does not respond, or the arm has stopped.
         """
         if self._policy is not None:
             return self._measured_by_driver(self._connect_robot())
@@ -131,9 +131,9 @@ class Ur5e(Driver):
         if stamp != self._stamp:
             self._stamp, self._heard = stamp, now
         elif now - self._heard > SILENT:
-            raise RuntimeError(f"robot at {self._host}: silent for {SILENT} s")
+            raise RuntimeError(f"robot at {self._host}: no message for {SILENT} s")
         if mounting is None:
-            raise RuntimeError("ur5e: measured before the first episode")
+            raise RuntimeError("ur5e: no episode has begun; call reset() first")
         place, way = mounting.to_table(pose), mounting.rotate_to_table(velocity)
         return np.concatenate([place[:2], way[:2]])[None]
 
@@ -144,7 +144,7 @@ class Ur5e(Driver):
         return np.array([[now.x, now.y, now.vx, now.vy]])
 
     def _connect_reader(self) -> PoseReader:
-        """Return the arm's reader; a copy of a driver gets one of its own."""
+        """Return the reader of the arm; a copy of the driver opens its own."""
         if self._reader is None:
             self._reader = PoseReader(self._host)
             self._heard = time.monotonic()
@@ -176,15 +176,15 @@ class Ur5e(Driver):
 
 def _mounted(mounting: Mounting | None) -> Mounting:
     if mounting is None:
-        raise RuntimeError("ur5e: no episode has begun")
+        raise RuntimeError("ur5e: no episode has begun; call reset() first")
     return mounting
 
 
 def _check_emulated(host: str) -> None:
-    """Refuse a controller on another machine: it may be a real arm.
+    """Check that a controller is on this machine and therefore emulated.
 
     Raises:
-        ValueError: It is.
+        ValueError: It is on another machine, so that it may be a real arm.
     """
     try:
         emulated = ipaddress.ip_address(host).is_loopback
@@ -192,8 +192,8 @@ def _check_emulated(host: str) -> None:
         emulated = host == "localhost"
     if not emulated:
         raise ValueError(
-            f"ur5e: {host} may be a real arm, and no policy moves one from a simulated "
-            "table; use --backend real"
+            f"ur5e: {host} may be a real arm, which a policy cannot move from a "
+            "simulated table; use --backend real"
         )
 
 

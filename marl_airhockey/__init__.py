@@ -7,10 +7,11 @@ import lazy_loader as _lazy_loader
 
 _here = _Path(__file__).parent
 if not (_here / "scenarios").is_dir():
-    # In a checkout scenarios/ and drivers/ lie beside this package; in a wheel, in it.
+    # In a checkout, scenarios/ and drivers/ are next to this package; in a wheel, in
+    # it.
     __path__.append(str(_here.parent))
 
-# The public names are listed in __init__.pyi; each is imported when it is first used.
+# __init__.pyi lists the public names. Each is imported when it is first used.
 __getattr__, __dir__, __all__ = _lazy_loader.attach_stub(__name__, __file__)
 
 from marl_airhockey import game_modules as _game_modules  # noqa: E402

@@ -25,8 +25,8 @@ from marl_airhockey.sim.world.keywords import Keywords, check_keywords
 from marl_airhockey.sim.world.world import World
 
 LONGEST_STEP = 0.2
-"""Longest control step, s, for which overlaps stay below 0.25 mm; in longer ones a
-paddle has time to come to where a puck has crossed a goal line."""
+"""Longest control step, s. With it, overlaps stay below 0.25 mm. In a longer step, a
+paddle could reach the position at which a puck has crossed a goal line."""
 
 
 def build_world(
@@ -36,43 +36,29 @@ def build_world(
     keywords: Keywords,
     forms: Collection[str] = (),
 ) -> World:
-    """Build B worlds of a scenario from the keywords that all environments share.
+    """Create B worlds of a scenario from the keywords that all environments share.
 
     Args:
-        scenario: Name, code or object, see `registry.find_scenario`.
+        scenario: Name, code, class or object, see `registry.find_scenario`.
         num_worlds: Number of worlds, B.
-        autoreset: Whether a new episode begins where one ended.
-        keywords: Keywords, all optional:
-            backend: Name of the physics ("numba").
-            drivers: Drivers of seats by agent, see `registry.make_driver`: names, paths
-                of policies, functions, models and so on; the other seats are open.
-            seats: "robot" or "arcade".
-            profile: "ideal", or the sensing and the spread of physics of a robot:
-                "ur5e", "ur5e-authors" or "gantry", or a file,
-                see `profiles.find_profile`.
-            observe: "velocity" (in the ideal profile), "history" (in the others),
-                "estimate" or "pixels", see `observable.OBSERVE`.
-            goals: "flat" or "dict".
-            physics: Name of a preset, a TOML file, or parameters by name, values or
-                (low, high) sampled per episode, which may name a ``preset``.
-            control_dt: Time between two actions, s (0.05).
-            substeps: Least number of physics steps in one control step (the
-                backend's own); not for numba, which has none.
-            max_cycles: Length of an episode in control steps.
-            options: Fields of the scenario by name.
-            rig: File of a real table's devices and their calibration, for the backend
-                "real" alone, see `rig.Rig`.
-        forms: Forms of observations of players who take open seats later, such as
-            those of a `Roster`; those of the keywords' drivers are known.
+        autoreset: True to begin a new episode in the step in which one ended.
+        keywords: Shared keywords, which `make.parallel_env` explains. All are optional.
+        forms: Observation types of drivers that take open seats later, such as those of
+            a `Roster`. The types of the drivers in ``keywords`` are added
+            automatically.
+
+    Returns:
+        Worlds; seats without a driver are open.
 
     Raises:
-        UnknownKeywordError: A keyword that is none of these; TypeError and ValueError.
-        ValueError: An unknown name or a value that makes no sense, named.
-        RuntimeError: A backend that cannot run here, with the fix.
+        UnknownKeywordError: A keyword is unknown. The error is a TypeError and a
+            ValueError.
+        ValueError: A name is unknown, or a value is not valid.
+        RuntimeError: The backend cannot run here. The message states what to do.
     """
     check_keywords(keywords)
     keywords = table_keywords(keywords)
-    threads()  # Refused here if it makes no sense, not at the first step.
+    threads()  # Check the number of threads here, before the first step.
     num_worlds = check_count("num_worlds", num_worlds)
     game = scenario_of(scenario, keywords)
     profile, max_cycles = keywords.get("profile", "ideal"), keywords.get("max_cycles")
@@ -83,7 +69,7 @@ def build_world(
     backend = _backend(kind, game, num_worlds, keywords)
     usual = "velocity" if profile == "ideal" else "history"
     own = [driver.observe for driver in drivers.values() if driver.observe]
-    # Each once, in this order: the first is the form of the open seats.
+    # Each type occurs once. The first one is the type of the open seats.
     every = dict.fromkeys([keywords.get("observe", usual), *own, *forms])
     return World(game, backend, drivers, physics, tuple(every), max_cycles, autoreset)
 
@@ -95,22 +81,25 @@ def build_driven_world(
     keywords: Keywords,
     forms: Collection[str] = (),
 ) -> World:
-    """Build worlds in which a driver controls ``paddle_0`` and its teammates' seats.
+    """Create worlds in which a driver controls ``paddle_0`` and its teammates.
 
-    All other seats need drivers, too. Episodes do not restart.
+    All other seats need drivers, too. Worlds do not begin a new episode automatically.
 
     Args:
         driver: Driver of the team of ``paddle_0``.
         scenario: Name of the scenario, or a scenario object.
-        num_worlds: Number of worlds.
-        keywords: Keywords of the environment; its drivers replace that of teammates.
-        forms: See `build_world`.
+        num_worlds: Number of worlds, B.
+        keywords: Shared keywords. Their drivers replace ``driver`` at the seats of
+            teammates.
+        forms: Observation types of drivers that take seats later, see `build_world`.
 
     Raises:
-        ValueError: A seat without a driver, named.
+        ValueError: A seat has no driver.
     """
     if "paddle_0" in keywords.get("drivers", {}):
-        raise ValueError("drivers: paddle_0 is the seat of the driver that is measured")
+        raise ValueError(
+            "drivers: paddle_0 is the seat of the evaluated driver; leave it out"
+        )
     scene = scenario_of(scenario, keywords).scene
     team = [i for i, s in enumerate(scene.seats) if s.team == scene.seats[0].team]
     own = {f"paddle_{i}": driver for i in team}
@@ -119,7 +108,7 @@ def build_driven_world(
     world = build_world(scenario, num_worlds, False, driven, forms)
     if len(world.open):
         raise ValueError(
-            f"{world.scenario.name!r} has more seats: say who drives paddle_"
+            f"{world.scenario.name!r} has more seats: add a driver for paddle_"
             f"{world.open[0]}, e.g. --driver paddle_{world.open[0]}=goalkeeper"
         )
     return world
@@ -128,11 +117,11 @@ def build_driven_world(
 def table_keywords(keywords: Keywords) -> Keywords:
     """Return keywords with the table and the profile of a real table's rig.
 
-    Those that are given stay, but for the profile "ideal", which no real table has.
-    Keywords of a simulation are returned as they are.
+    A given table or profile has priority, except for the profile "ideal", which no real
+    table has. Keywords of a simulation are returned unchanged.
 
     Raises:
-        ValueError: A rig that cannot be read.
+        ValueError: The file of the rig cannot be read.
     """
     backend = find_backend(keywords.get("backend", DEFAULT_BACKEND))
     rig = keywords.get("rig", "")
@@ -146,25 +135,25 @@ def table_keywords(keywords: Keywords) -> Keywords:
 
 
 def _backend_of(game: Scenario, keywords: Keywords) -> type[Backend]:
-    """Return the class of the backend that keywords name, which supports a scenario."""
+    """Return the class of the backend, which must support the scenario."""
     name = keywords.get("backend", DEFAULT_BACKEND)
     kind = find_backend(name)
     reason = kind.supports(game.scene)
     if reason:
-        raise ValueError(f"backend {name!r} cannot play {game.name!r}: {reason}")
+        raise ValueError(f"backend {name!r} does not support {game.name!r}: {reason}")
     return kind
 
 
 def _backend(
     kind: type[Backend], game: Scenario, num_worlds: int, keywords: Keywords
 ) -> Backend:
-    """Return a backend of a kind for the scene of a scenario."""
+    """Return a backend of a class for the scene of a scenario."""
     control_dt, substeps = keywords.get("control_dt", 0.05), keywords.get("substeps")
     _check_times(control_dt, substeps)
     if not issubclass(kind, LiveBackend):
         if "rig" in keywords:
             raise ValueError(
-                'rig: this backend has no devices; leave it out, or take backend="real"'
+                'rig: this backend has no devices; leave it out, or set backend="real"'
             )
         return kind(game.scene, num_worlds, control_dt, substeps)
     if num_worlds != 1:
@@ -180,7 +169,7 @@ def _backend(
 def _physics(
     game: Scenario, backend: type[Backend], keywords: Keywords, real: bool
 ) -> Physics:
-    """Return the ranges of physics that keywords name, see `Physics` for ``real``."""
+    """Return the ranges of physics parameters; `Physics` explains ``real``."""
     return Physics(
         game.scene.defaults,
         keywords.get("profile", "ideal"),
@@ -191,7 +180,7 @@ def _physics(
 
 
 def _drivers(game: Scenario, live: bool, keywords: Keywords) -> dict[int, Driver]:
-    """Return the drivers that keywords name, by seat."""
+    """Return the drivers in the keywords, by seat index."""
     agents = [f"paddle_{i}" for i in range(len(game.scene.seats))]
     drivers: dict[int, Driver] = {}
     for agent, driver in keywords.get("drivers", {}).items():
@@ -203,22 +192,22 @@ def _drivers(game: Scenario, live: bool, keywords: Keywords) -> dict[int, Driver
 
 
 def refuse_erratic(agent: str, driver: Driver, live: bool) -> None:
-    """Refuse an erratic driver on a real table.
+    """Check that a driver may move the arm of a real table.
 
     Args:
         agent: Agent at the driver's seat.
-        driver: Driver.
-        live: Whether a real arm would follow it.
+        driver: Driver of the seat.
+        live: True if a real arm would follow the driver.
 
     Raises:
-        ValueError: It is erratic, and a real arm would.
+        ValueError: A real arm would follow a driver that must never move one.
     """
     if live and driver.erratic:
         raise ValueError(f"{agent}: {driver!r} must not move a real arm")
 
 
 def compile_world(scenario: str | Scenario, keywords: Keywords) -> None:
-    """Compile all that a world needs, once per machine, restarts too."""
+    """Compile all code of a world, including resets, once for each machine."""
     for worlds in (1, 2):
         world = build_world(scenario, worlds, autoreset=True, keywords=keywords)
         world.reset(0)
@@ -232,15 +221,15 @@ def _check_times(control_dt: float, substeps: int | None) -> None:
     if not 0.001 <= control_dt <= LONGEST_STEP:
         raise ValueError(
             f"control_dt: {control_dt} s must be in 0.001 .. {LONGEST_STEP}; in longer "
-            "steps a paddle overlaps a puck that has scored"
+            "steps a paddle could overlap a puck that has scored"
         )
     if substeps is not None:
-        why = ": control_dt is a multiple of the simulation's step"
+        why = ": control_dt is a multiple of the physics step"
         check_count("substeps", substeps, why)
 
 
 def scenario_of(scenario: str | Scenario, keywords: Keywords) -> Scenario:
-    """Return the scenario that keywords ask for."""
+    """Return the scenario with the options in the keywords."""
     options = dict(keywords.get("options", {}))
     for shared in ("seats", "goals"):
         if shared not in keywords:

@@ -1,4 +1,4 @@
-"""Modules of games as PettingZoo's own: ``from marl_airhockey import duel_v0``."""
+"""Modules of games as in PettingZoo: ``from marl_airhockey import duel_v0``."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ VERSIONED = re.compile(r"([a-z]\w*)_v(\d+)")
 
 
 class GameFinder(MetaPathFinder, Loader):
-    """Finder of modules of games: ``duel_v0.parallel_env()``.
+    """Finder of modules of games, for ``duel_v0.parallel_env()``.
 
-    They are found by ``from marl_airhockey import duel_v0`` and by
-    ``import marl_airhockey.duel_v0``.
+    Both ``from marl_airhockey import duel_v0`` and ``import marl_airhockey.duel_v0``
+    use it.
     """
 
     def find_spec(
         self, fullname: str, path: object, target: object = None
     ) -> ModuleSpec | None:
-        """Return the spec of a scenario with a version; None for all else.
+        """Return the spec of a scenario with a version; None for other names.
 
         Raises:
-            ImportError: another version of a scenario.
+            ImportError: The scenario has another version.
         """
         package, _, name = fullname.rpartition(".")
         found = VERSIONED.fullmatch(name)
@@ -36,7 +36,7 @@ class GameFinder(MetaPathFinder, Loader):
         current = version_of(found[1])
         if int(found[2]) != current:
             raise ImportError(
-                f"{name}: this release of marl_airhockey plays {found[1]}_v{current}"
+                f"{name}: this release of marl_airhockey contains {found[1]}_v{current}"
             )
         return ModuleSpec(fullname, self, loader_state=found[1])
 
@@ -51,4 +51,4 @@ class GameFinder(MetaPathFinder, Loader):
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """Do nothing: the module is whole."""
+        """Do nothing, because `create_module` returns the complete module."""

@@ -1,7 +1,7 @@
-"""Scenarios and drivers from outside: files, modules and installed packages.
+"""Scenarios and drivers of users: files, modules and installed packages.
 
-A text that names code, ``my_task.py``, ``my_task.py:Task`` or ``package.module:Task``,
-is run because somebody wrote it there; nothing here looks into files for such texts.
+A text that names code (``my_task.py``, ``my_task.py:Task`` or ``package.module:Task``)
+runs this code. These functions do not search files for such texts.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from types import ModuleType
 from typing import Any
 
 author_files: set[str] = set()
-"""Files that texts and entry points have named, to tell an author's code from ours."""
+"""Files of users that were loaded, to separate their code from this library."""
 
 
 def plugins(kind: str) -> dict[str, EntryPoint]:
-    """Return entry points of installed packages by name, none of them loaded.
+    """Return entry points of installed packages by name, without loading them.
 
     Args:
-        kind: "scenarios" or "drivers", the end of the group ``marl_airhockey.<kind>``.
+        kind: End of the group ``marl_airhockey.<kind>``, "scenarios" or "drivers".
     """
     return {e.name: e for e in entry_points(group=f"marl_airhockey.{kind}")}
 
 
 def load_plugin(entry: EntryPoint) -> Any:
-    """Return what an entry point names, a class or a function that makes an object.
+    """Return the class or function of an entry point.
 
     Raises:
-        ValueError: it cannot be imported.
+        ValueError: The entry point cannot be imported.
     """
     try:
         loaded = entry.load()
@@ -45,7 +45,7 @@ def load_plugin(entry: EntryPoint) -> Any:
 
 
 def names_code(text: str) -> bool:
-    """Return True if a text names a Python file, or something in a module there is."""
+    """Return True if a text names a Python file or a module that exists."""
     place, colon, name = text.partition(":")
     if place.endswith(".py"):
         return not colon or name.isidentifier()
@@ -60,12 +60,12 @@ def load_code(text: str, base: type) -> Any:
     """Return the class, function or object that a text names.
 
     Args:
-        text: ``FILE.py``, ``FILE.py:NAME`` or ``package.module:NAME``. Without a name,
-            it is the file's ``make``, or the only class of its own below ``base``.
-        base: class that a file's class must be below.
+        text: Text ``FILE.py``, ``FILE.py:NAME`` or ``package.module:NAME``. Without a
+            name, the result is ``make`` of the file, or its only subclass of ``base``.
+        base: Base class of the classes in a file.
 
     Raises:
-        ValueError: no such file, module or name, or one that fails to import.
+        ValueError: The file, module or name does not exist, or the import fails.
     """
     place, _, name = text.partition(":")
     module = _file(Path(place)) if place.endswith(".py") else _module(place)
@@ -86,8 +86,8 @@ def load_code(text: str, base: type) -> Any:
     if len(found) != 1:
         names = ", ".join(value.__name__ for value in found) or "none"
         raise ValueError(
-            f"{place}: expected one class below {base.__name__}, found {names}; say "
-            f"which, {place}:NAME"
+            f"{place}: expected one subclass of {base.__name__}, found {names}; name "
+            f"one with {place}:NAME"
         )
     return found[0]
 
@@ -106,13 +106,13 @@ def _file(path: Path) -> ModuleType:
         if getattr(loaded, "__file__", None) == str(path):
             return loaded
         raise ValueError(
-            f"{path}: a module named {path.stem!r} is loaded already; rename the file"
+            f"{path}: a module named {path.stem!r} is already loaded; rename the file"
         )
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    # Dataclasses and pickles look their module up by its name.
+    # Dataclasses and pickles find their module by its name.
     sys.modules[path.stem] = module
     try:
         spec.loader.exec_module(module)
@@ -132,7 +132,7 @@ def _module(name: str) -> ModuleType:
 
 @contextmanager
 def _here() -> Iterator[None]:
-    """Find modules of the folder where one works, too, as `python -m` does."""
+    """Also find modules of the current folder, as `python -m` does."""
     here = str(Path.cwd())
     sys.path.insert(0, here)
     try:

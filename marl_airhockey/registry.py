@@ -1,4 +1,4 @@
-"""Find a scenario, an agent or a backend by the name of its file."""
+"""Find a scenario, a driver or a backend by its name."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from marl_airhockey.sim.contracts.scenario import GoalScenario, Scenario
 from marl_airhockey.sim.core.errors import unknown_name
 
 DEFAULT_BACKEND = "numba"
-"""Name of the backend that is used unless another is given"""
+"""Name of the default backend."""
 REAL = "real"
-"""Name of the backend of a real table"""
+"""Name of the backend of a real table."""
 
 
 def _load(kind: str, folder: str, name: str, names: list[str]) -> ModuleType:
@@ -34,7 +34,7 @@ def _load(kind: str, folder: str, name: str, names: list[str]) -> ModuleType:
 
 
 def _maker(kind: str, folder: str, group: str, name: str) -> Callable[..., object]:
-    """Return what makes the scenario or driver of a name, ours or a plugin's."""
+    """Return the class or function of a scenario or driver of ours or of a plugin."""
     own, others = names_in(folder), plugins(group)
     if name in own or name not in others:
         module = _load(kind, folder, name, sorted({*own, *others}))
@@ -43,22 +43,22 @@ def _maker(kind: str, folder: str, group: str, name: str) -> Callable[..., objec
 
 
 def scenario_names() -> list[str]:
-    """Return the names of all scenarios of ours: the files of ``scenarios/``."""
+    """Return the names of all scenarios in ``scenarios/``."""
     return names_in("scenarios")
 
 
 def plugin_names(kind: str) -> list[str]:
-    """Return the names that installed packages add: "scenarios" or "drivers"."""
+    """Return the names of "scenarios" or "drivers" that installed packages add."""
     return sorted(plugins(kind))
 
 
 def driver_names() -> list[str]:
-    """Return the names of all drivers: the files of ``drivers/``."""
+    """Return the names of all drivers in ``drivers/``."""
     return names_in("drivers")
 
 
 def independent_driver_names() -> list[str]:
-    """Return the names of drivers that play by themselves: no device, no person."""
+    """Return the names of the drivers that need no device and no person."""
     kinds = {name: driver_class(name) for name in driver_names()}
     return [
         name
@@ -71,38 +71,42 @@ def driver_class(name: str) -> type[Driver]:
     """Return the class of a driver in ``drivers/``.
 
     Raises:
-        ValueError: An unknown name.
+        ValueError: The name is unknown.
     """
     return cast(type[Driver], _load("driver", "drivers", name, driver_names()).make)
 
 
 def backend_names() -> list[str]:
-    """Return the names of all backends, the simulated ones and "real"."""
+    """Return the names of all backends: the simulated ones and "real"."""
     return sorted([*simulated_names(), REAL])
 
 
 def make_scenario(name: str, **options: Any) -> Scenario:
-    """Build the scenario of ``scenarios/<name>.py``, or that of an installed package.
+    """Create a scenario of this library or of an installed package.
 
-    No code runs that a text names: see `find_scenario`.
+    In contrast to `find_scenario`, a name never runs code of a file or module.
+
+    Args:
+        name: Name of the scenario.
+        **options: Fields of the scenario by name.
 
     Raises:
-        ValueError: an unknown name or option, or an option that makes no sense.
+        ValueError: The name or an option is unknown, or a value is not valid.
     """
     make = _maker("scenario", "scenarios", "scenarios", name)
     return _scenario(name, make, options)
 
 
 def find_scenario(given: str | Scenario | type[Scenario], **options: Any) -> Scenario:
-    """Build a scenario from its name, code, a class or an object.
+    """Create a scenario from a name, code, a class or an object.
 
     Args:
-        given: Name; code, ``my_task.py`` or ``package.module:Task``; a class; or a
-            scenario, which is returned as it is.
-        **options: Fields of the scenario.
+        given: Name of a scenario; code, ``my_task.py`` or ``package.module:Task``; a
+            class; or a scenario object, which is returned unchanged.
+        **options: Fields of the scenario by name.
 
     Raises:
-        ValueError: An unknown name or option, or code that makes no scenario.
+        ValueError: A name or an option is unknown, or the code defines no scenario.
     """
     if not isinstance(given, str):
         return _scenario(getattr(given, "__name__", repr(given)), given, options)
@@ -112,44 +116,46 @@ def find_scenario(given: str | Scenario | type[Scenario], **options: Any) -> Sce
 
 
 def has_goals(given: str | Scenario | type[Scenario]) -> bool:
-    """Return whether a scenario has goals, see `find_scenario`."""
+    """Return True if a scenario has goals; `find_scenario` explains the argument."""
     return isinstance(find_scenario(given), GoalScenario)
 
 
 def _scenario(name: str, make: Any, options: Mapping[str, Any]) -> Scenario:
-    """Return a scenario from its class, or the object itself, without options."""
+    """Return a scenario from its class, or the given object if it has no options."""
     if isinstance(make, Scenario):
         if options:
             names = sorted(options)
-            raise ValueError(f"options {names}: give them to the scenario object")
+            raise ValueError(f"options {names}: set them in the scenario object")
         return make
     if not (isinstance(make, type) and issubclass(make, Scenario)):
         raise ValueError(
-            f"{name}: {make!r} is no scenario; give a class below Scenario"
+            f"{name}: {make!r} is not a scenario; expected a subclass of Scenario"
         )
     known = [f.name for f in dataclasses.fields(make)]
     return cast(Scenario, _build(f"option of {name}", make, options, known))
 
 
 def zoo_names() -> list[str]:
-    """Return the names of the trained policies that come with the library."""
+    """Return the names of the trained policies of this library."""
     return sorted(f"zoo/{path.stem}" for path in ZOO.glob("*.npz"))
 
 
 def make_driver(player: object, **options: Any) -> Driver:
-    """Build a driver from its name, a path, code or an object.
+    """Create a driver from a name, a path, code or an object.
 
     Args:
-        player: Name of a file of ``drivers/``, with or without options after a colon
-            (``allround:strength=fair,depth=0.05``); of a trained policy that comes with
-            the library (``zoo/duel``); of an installed package's driver; path of a
-            policy's file or run folder; code, ``my_driver.py`` or
-            ``package.module:Class``, with or without options; or an object, see
-            `policies.callables.driver_of`.
-        **options: Options in addition to those in the name.
+        player: One of the following. Options may follow a name and code after a colon,
+            as in ``allround:strength=fair,depth=0.05``.
+
+            - Name of a driver of this library or of an installed package.
+            - Name of a trained policy of this library, as in ``zoo/duel``.
+            - Path of a policy's file or of a run folder.
+            - Code, ``my_driver.py`` or ``package.module:Class``.
+            - Object that `policies.callables.driver_of` accepts.
+        **options: Options in addition to the options in the name.
 
     Raises:
-        ValueError: An unknown name or option, or one that makes no sense.
+        ValueError: A name or an option is unknown, or a value is not valid.
     """
     if isinstance(player, (str, Path)):
         name, make, more = _named(player)
@@ -158,9 +164,9 @@ def make_driver(player: object, **options: Any) -> Driver:
 
 
 def _named(given: str | Path) -> tuple[str, Any, dict[str, Any]]:
-    """Return the name of a driver, what makes it, and the options in its name."""
+    """Return the name of a driver, its class or function, and its options."""
     text, path = str(given), Path(given)
-    if isinstance(given, Path):  # A file, whatever its name looks like.
+    if isinstance(given, Path):  # Always a file, with any name.
         return text, partial(_load_file, path), {}
     short, _, tail = text.partition(":")
     if short.startswith("zoo/"):
@@ -179,17 +185,17 @@ def _named(given: str | Path) -> tuple[str, Any, dict[str, Any]]:
     names = [*driver_names(), *plugin_names("drivers")]
     raise ValueError(
         unknown_name("driver", text, names)
-        + "; or a policy's path, my_driver.py or package.module:Class"
+        + "; a policy's path, my_driver.py or package.module:Class is possible, too"
     )
 
 
 def _load_file(path: Path, deterministic: bool = True) -> Driver:
-    """Load a policy. Trust in its code is no option: names come from files, too."""
+    """Load a policy. Names may come from files, so its code is never trusted."""
     return load_policy(path, bool(deterministic))
 
 
 def _driver(name: str, given: Any, options: Mapping[str, Any]) -> Driver:
-    """Return a driver from a function or class that makes one, or from an object."""
+    """Return a driver from a class, a function that returns one, or an object."""
     own_class = isinstance(given, type) and issubclass(given, Driver)
     named_make = inspect.isfunction(given) and given.__name__ == "make"
     if own_class or named_make or isinstance(given, partial):
@@ -208,12 +214,12 @@ def _driver(name: str, given: Any, options: Mapping[str, Any]) -> Driver:
                 )
         given = _build(f"option of {name}", given, options, list(parameters))
     elif options:
-        raise ValueError(f"options {sorted(options)}: {name} takes none")
+        raise ValueError(f"options {sorted(options)}: {name} has no options")
     return driver_of(given)
 
 
 def _split(text: str) -> tuple[str, str]:
-    """Return the name of a player without its options, and the options."""
+    """Return the name of a driver without its options, and the options."""
     head, _, tail = text.rpartition(":")
     return (head, tail) if "=" in tail else (text, "")
 
@@ -241,8 +247,8 @@ def find_backend(name: str) -> type[Backend]:
     """Return the class of a backend.
 
     Raises:
-        ValueError: An unknown name.
-        RuntimeError: It cannot run here; the message says the fix.
+        ValueError: The name is unknown.
+        RuntimeError: The backend cannot run here. The message states what to do.
     """
     if name not in backend_names():
         raise ValueError(unknown_name("backend", name, backend_names()))
@@ -259,7 +265,7 @@ def find_backend(name: str) -> type[Backend]:
 
 
 def is_live(backend: str) -> bool:
-    """Return True for the name of a backend of a real table."""
+    """Return True if a name is that of a backend of a real table."""
     return issubclass(find_backend(backend), LiveBackend)
 
 

@@ -1,4 +1,4 @@
-"""Types that every package uses."""
+"""Types that all packages use."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 Memory = dict[str, Array]
-"""Named arrays ``(..., *)`` that a scenario or a driver keeps of an episode."""
+"""Arrays ``(..., *)`` by name that a scenario or a driver stores for an episode."""
 Rows = Array | slice
-"""Some of the worlds: indices (W,), or a slice."""
+"""Selection of worlds: indices (W,) or a slice."""
 ALL = slice(None)
-"""`Rows` of all worlds."""
+"""Selection of all worlds, see `Rows`."""

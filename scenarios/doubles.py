@@ -21,7 +21,7 @@ class Doubles(Versus):
     """
 
     apart: Metres = 0.24
-    """Distance of mates at the start (m)."""
+    """Distance between teammates at the start, m."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -29,8 +29,8 @@ class Doubles(Versus):
         widest = self.table_geometry.size[1] - paddle
         if not paddle <= self.apart <= widest:
             raise ValueError(
-                f"apart: {self.apart:g} m, but paddles have room from {paddle:.3f} to "
-                f"{widest:.3f} m"
+                f"apart: {self.apart:g} m; expected {paddle:.3f} to {widest:.3f} m, so "
+                "that the paddles fit"
             )
 
     @property

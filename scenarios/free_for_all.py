@@ -28,7 +28,7 @@ from marl_airhockey.toolkit import (
 )
 
 START = 0.7
-"""Distance of paddles from the centre at the start, in inradii."""
+"""Distance of paddles from the centre at the start, divided by the inradius."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,8 +39,8 @@ class FreeForAll(Scenario):
     becomes a wall and its paddle is removed. The last player wins. If the time limit
     ends the game, the player with most lives wins, and among equals the one with most
     shots on goal. After a goal the puck is served to the player who lost a life. A puck
-    that is held for ``possession`` seconds, or rests where nobody reaches it, is served
-    to the next player.
+    that is held for ``possession`` seconds, or rests out of reach of all paddles, is
+    served to the next player.
 
     Start:
         Each paddle is in front of its goal. The puck is served from the centre to one
@@ -57,26 +57,26 @@ class FreeForAll(Scenario):
     sides: int = 4
     """Number of sides of the table, and of seats."""
     inradius: Metres = 0.45
-    """Distance of each side from the centre (m)."""
+    """Distance of each side from the centre, m."""
     lives: int = 3
-    """Number of goals after which a seat is out."""
+    """Number of conceded goals after which a player is eliminated."""
     goal_width: Metres = 0.30
-    """Width of the goal lines (m)."""
+    """Width of the goal lines, m."""
     possession: Seconds = 5.0
-    """Longest time that a seat may have the puck in its reach (s)."""
+    """Largest time for which a player may have the puck within reach, s."""
     shot_weight: Weight = 0.0
-    """Reward of a shot on goal that was stopped; its cost for who stopped it."""
+    """Reward of a stopped shot on goal, and cost for the player who stopped it."""
     jitter_weight: Weight = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.sides < 3:
-            raise ValueError(f"sides: {self.sides} must be at least 3")
+            raise ValueError(f"sides: {self.sides}; expected at least 3")
         between = START * self.table_geometry.offsets[0] * np.sin(np.pi / self.sides)
         if between < self.table_geometry.paddle_radius:
             raise ValueError(
-                f"sides: paddles of {self.sides} overlap at the start; give more "
-                f"inradius than {self.inradius:g} m"
+                f"sides: {self.sides} paddles overlap at the start; choose an inradius "
+                f"above {self.inradius:g} m"
             )
 
     @cached_property
@@ -120,13 +120,13 @@ class FreeForAll(Scenario):
         }
 
     def _toward(self, side: Array) -> Array:
-        """(W,) headings from the centre to sides, rad."""
+        """Return the headings from the centre to sides (W,), table frame, rad."""
         return np.asarray(np.pi + 2.0 * np.pi * side / self.sides)
 
     def update_memory(self, t: Transition) -> Memory:
         lost = t.after.crossed[..., 0, :] & (t.memory["lives"] > 0.0)
         lives = t.memory["lives"] - lost
-        # A seat that is out holds nothing: a puck at rest before it lies.
+        # An eliminated seat holds no puck: a puck at rest in its reach is re-served.
         held = np.where((lives > 0.0)[..., None], rewards.held(self.scene, t), 0.0)
         lying = rewards.lying(t, held)
         foul = held[..., 0] >= self.possession - 1e-9
@@ -155,7 +155,7 @@ class FreeForAll(Scenario):
         }
 
     def _follower(self, lives: Array, side: int) -> Array:
-        """(...) next seat with lives after a side."""
+        """Return the next seat with lives after a side (...)."""
         follower = np.full_like(lives[..., 0], float(side))
         for step in range(self.sides - 1, 0, -1):
             other = (side + step) % self.sides
@@ -174,12 +174,12 @@ class FreeForAll(Scenario):
         )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
         conceded: -1 for each life that the seat loses.
-        scored: 1 for the seat that touched the puck last when another loses a life.
-        shot: ``shot_weight`` for each shot on goal that another seat stopped, and minus
-        that for each that it stopped itself.
+        scored: 1 for the seat that touched the puck last when another one loses a life.
+        shot: ``shot_weight`` for each own shot on goal that another seat stopped, and
+        ``-shot_weight`` for each shot that the seat stopped.
         """
         lost = t.memory["lives"] - t.new_memory["lives"]
         own = 1.0 + np.arange(self.sides)
@@ -207,11 +207,11 @@ class FreeForAll(Scenario):
         return np.asarray(memory["lives"] <= 0.0)
 
     def scores(self, memory: Memory) -> dict[str, Array]:
-        """Return lives, and shots on goal that were stopped, by seat."""
+        """Return the lives and the stopped shots on goal, by seat."""
         return {"lives": memory["lives"], "shots": memory["shots"]}
 
     def decided_by(self, memory: Memory) -> str:
-        """Return "lives", or "shots on goal" of those that have most; "" if level."""
+        """Return "lives", "shots on goal" for equal lives, or "" if both are equal."""
         leading = memory["lives"] == memory["lives"].max()
         if leading.sum() == 1:
             return "lives"
@@ -219,7 +219,7 @@ class FreeForAll(Scenario):
         return "shots on goal" if (shots == shots.max()).sum() == 1 else ""
 
     def success(self, t: Transition) -> Array:
-        """(..., seats) bool: the seat is the last one, or leads as the clock ends."""
+        """(..., seats) bool: The seat is the last one, or leads at the time limit."""
         lives, shots = t.new_memory["lives"], t.new_memory["shots"]
         merit = np.where(lives == lives.max(-1, keepdims=True), shots, -1.0)
         best = merit == merit.max(-1, keepdims=True)

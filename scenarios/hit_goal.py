@@ -44,7 +44,7 @@ class HitGoal(FewShots, GoalScenario):
     PATH = True
     seconds: Seconds = 10.0
     radius: Metres = 0.04
-    """Radius of the circle (m)."""
+    """Radius of the circle, m."""
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
         worlds, table = len(rng), self.scene.table
@@ -71,12 +71,13 @@ class HitGoal(FewShots, GoalScenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        approach: metres by which the paddle came nearer to the puck than before.
-        aim: 2 times the metres by which a struck puck came nearer to the goal.
-        success: 3 once.
-        drop: -1 when the puck passes the home line.
+        approach: Decrease of the shortest distance between paddle and puck so far, m.
+        aim: 2 times the decrease of the shortest distance between the struck puck and
+        the goal so far, m.
+        success: 3, once.
+        drop: -1 when the puck crosses the home line.
         """
         return {
             "approach": rewards.approach(t),
@@ -92,11 +93,11 @@ class HitGoal(FewShots, GoalScenario):
         return np.asarray(t.new_memory["entered"] | over)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: a touched, rising puck has been inside the circle in time."""
+        """(...) bool: A rising puck was in the circle within ``shots`` touches."""
         return t.new_memory["entered"]
 
     def paper_success(self, t: Transition) -> Array:
-        """(...) bool: within 0.15 m of the goal, rising."""
+        """(...) bool: The puck is within 0.15 m of the goal and rises."""
         puck, velocity = t.after.puck[..., 0, :], t.after.puck_velocity[..., 0, :]
         near = length(puck - t.memory["goal"]) < 0.15
         return np.asarray(near & (velocity[..., 0] > 0))

@@ -50,15 +50,15 @@ class HitGoalVelocity(FewShots, GoalScenario):
     PATH = True
     seconds: Seconds = 10.0
     shots: int = 1
-    """Number of distinct touches of which one must succeed."""
+    """Number of distinct touches within which the task must succeed."""
     radius: Metres = 0.09
-    """Radius of the circle (m)."""
+    """Radius of the circle, m."""
     angle: Degrees = 15.0
-    """Largest angle to the target velocity (deg)."""
+    """Largest angle to the target velocity, deg."""
     speed_share: Share = 0.20
     """Largest error of the speed, as a share of the target speed."""
     speed_slack: Speed = 0.05
-    """Further error of the speed (m/s)."""
+    """Additional error of the speed, m/s."""
 
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state, puck = starts.falling(rng, self.scene), playable_puck(rng, self.scene)
@@ -116,12 +116,12 @@ class HitGoalVelocity(FewShots, GoalScenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        approach: metres by which the paddle came nearer to the puck than before.
-        score: 3 times the gain in the best score of position and velocity together.
-        success: 3 once.
-        drop: -1 when the puck passes the home line.
+        approach: Decrease of the shortest distance between paddle and puck so far, m.
+        score: 3 times the increase of the best score of position and velocity so far.
+        success: 3, once.
+        drop: -1 when the puck crosses the home line.
         """
         return {
             "approach": rewards.approach(t),
@@ -136,16 +136,19 @@ class HitGoalVelocity(FewShots, GoalScenario):
         return np.asarray(t.new_memory["entered"] | over)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: a rising puck has matched the goal in position and velocity."""
+        """(...) bool: A rising puck met the goal in position and velocity.
+
+        It met both at one instant, after at most ``shots`` touches.
+        """
         return t.new_memory["entered"]
 
     def paper_success(self, t: Transition) -> Array:
-        """(...) bool: within 0.1012 m of the goal, at any velocity."""
+        """(...) bool: The puck is within 0.1012 m of the goal, at any velocity."""
         gap = length(t.after.puck[..., 0, :] - t.memory["goal"])
         return np.asarray(gap < 0.1012)
 
     def targets(self, memory: Memory) -> Array | None:
-        return None  # Goals follow from the physics, after the start: see `reset`.
+        return None  # Goals are sampled after the start, see `finalize_goals`.
 
     @property
     def goal_bounds(self) -> tuple[float, ...]:

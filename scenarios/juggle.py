@@ -44,9 +44,9 @@ class Juggle(Scenario):
     pucks: Pucks = 1
     """Number of pucks."""
     lift: Metres = 0.3
-    """Height to which a hit must raise the puck's centre (m)."""
+    """Height by which a hit must raise the puck's centre, m."""
     hits: int = 4
-    """Number of hits that is a success."""
+    """Number of hits for a success."""
 
     @cached_property
     def scene(self) -> Scene:
@@ -78,10 +78,10 @@ class Juggle(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
         hit: 1 for each hit that raises the puck by ``lift``.
-        drop: -2 when the puck is lost at home.
+        drop: -2 when the puck crosses the home line.
         """
         return {
             "hit": (t.new_memory["hits"] - t.memory["hits"])[..., None],
@@ -92,13 +92,13 @@ class Juggle(Scenario):
         return rewards.lost(t)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the puck has been hit up ``hits`` times."""
+        """(...) bool: The puck has been hit up ``hits`` times."""
         return np.asarray(t.new_memory["hits"] >= self.hits)
 
     def paper_success(self, t: Transition) -> Array:
-        """(...) bool: after 2.5 s the puck is up to a quarter above the middle line.
+        """(...) bool: After 2.5 s, a puck is in the near quarter of the far half.
 
-        A quarter of the far half; not with the paddle near the middle line.
+        The paddle must be four paddle radii behind the centre line.
         """
         half = self.table_geometry.size[0] / 2
         x, paddle = t.after.puck[..., 0], t.after.paddle[..., 0, 0]

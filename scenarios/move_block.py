@@ -35,7 +35,7 @@ class MoveBlock(FewShots):
 
     Start:
         The paddle is near the home end. The puck falls from the far half. The block
-        rests in the far half, at least 0.09 m beside the puck.
+        rests in the far half, at least 0.09 m to the side of the puck.
 
     Termination:
         Success, a touch after the last shot, or the puck crosses the home line.
@@ -44,7 +44,7 @@ class MoveBlock(FewShots):
     version: ClassVar[int] = 1
     seconds: Seconds = 10.0
     way: Metres = 0.04
-    """Displacement of the block by a shot that is a success (m)."""
+    """Displacement of the block by a shot for a success, m."""
     shape: Literal["disc", "square"] = "disc"
     """Shape of the block."""
 
@@ -91,7 +91,7 @@ class MoveBlock(FewShots):
         struck = (t.after.touched > 0).any((-1, -2))
         rising = touched & ((t.before.puck_velocity[..., 0, 0] > 0) | struck)
         fair = hit & rising & self.within_shots(t.new_memory)
-        # What a falling puck does to the block is not counted: it moves the origin.
+        # A displacement by a falling puck does not count: it moves the origin.
         pushed = np.where(hit, fair, t.memory["pushed"])
         begins = fair & ~t.memory["pushed"]
         here = np.where(begins[..., None], t.before.block[..., 0, :], block)
@@ -114,13 +114,14 @@ class MoveBlock(FewShots):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        approach: metres by which the paddle came nearer to the puck than before.
-        aim: 2 times the metres by which a struck puck came nearer to the block.
-        moved: 10 times the metres by which the block was moved further than before.
-        success: 3 once.
-        drop: -1 when the puck passes the home line.
+        approach: Decrease of the shortest distance between paddle and puck so far, m.
+        aim: 2 times the decrease of the shortest distance between the struck puck and
+        the block so far, m.
+        moved: 10 times the increase of the largest displacement by a shot so far, m.
+        success: 3, once.
+        drop: -1 when the puck crosses the home line.
         """
         return {
             "approach": rewards.approach(t),
@@ -136,13 +137,14 @@ class MoveBlock(FewShots):
         return np.asarray(self.success(t) | over)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: a shot has moved the block by ``way``."""
+        """(...) bool: A shot has displaced the block by ``way``."""
         return np.asarray(t.new_memory["moved"] >= self.way)
 
     def paper_success(self, t: Transition) -> Array:
-        """(...) bool: after 0.25 s the block moves by a 5000th of the diagonal.
+        """(...) bool: After 0.25 s, the block moves by a 5000th of the diagonal.
 
-        Within a step here, since its start there; whatever the cause.
+        It must move so far in one step. The published code measures the displacement
+        since the start. The cause does not matter.
         """
         least = np.hypot(*self.table_geometry.size) / 5000
         moved = length(t.after.block[..., 0, :] - t.before.block[..., 0, :]) > least

@@ -32,7 +32,7 @@ class PuckVelocity(FallingPuck):
 
     seconds: Seconds = 5.0
     fast: Speed = 1.2
-    """Wanted upward speed (m/s)."""
+    """Upward speed of the puck for a success, m/s."""
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
         return {
@@ -48,12 +48,12 @@ class PuckVelocity(FallingPuck):
         }
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        approach: metres by which the paddle came nearer to the puck than before.
-        rise: m/s by which the puck climbed faster than before.
-        success: 2 once.
-        drop: -1 when the puck passes the home line.
+        approach: Decrease of the shortest distance between paddle and puck so far, m.
+        rise: Increase of the highest upward speed of the touched puck so far, m/s.
+        success: 2, once.
+        drop: -1 when the puck crosses the home line.
         """
         return {
             "approach": rewards.approach(t),
@@ -66,11 +66,11 @@ class PuckVelocity(FallingPuck):
         return self.success(t) | rewards.lost(t)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the puck has risen at ``fast`` after a touch."""
+        """(...) bool: The puck has risen at ``fast`` after a touch."""
         return np.asarray(t.new_memory["rise"] >= self.fast)
 
     def paper_success(self, t: Transition) -> Array:
-        """(...) bool: after 1.25 s the puck is 0.5 m above the middle line."""
+        """(...) bool: After 1.25 s, the puck is 0.5 m above the centre line."""
         high = t.after.puck[..., 0, 0] > 0.5
         return np.asarray(high & (t.after.time > 1.25))
 

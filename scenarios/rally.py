@@ -46,11 +46,11 @@ class Rally(Scenario):
     seats: str = "arcade"
     seconds: Seconds = 30.0
     crossings: int = 15
-    """Number of counted crossings that is a success."""
+    """Number of counted crossings for a success."""
     depth: Metres = 0.3
-    """Distance from the middle beyond which the puck must have been (m)."""
+    """Distance from the centre line that the puck must have exceeded, m."""
     patience: Seconds = 4.0
-    """Longest time without a counted crossing (s)."""
+    """Longest time without a counted crossing, s."""
     jitter_weight: Weight = 0.0
 
     @cached_property
@@ -84,7 +84,7 @@ class Rally(Scenario):
         # Seats are numbered from 1, as in `last_toucher`.
         seat = np.where(left, 1.0, 2.0)
         counts = crossed & ((toucher == seat) | (old == seat))
-        # How far into the half that it leaves, or will leave, the puck was struck.
+        # Depth of the contact in the half that the puck leaves or will leave.
         struck = rewards.contact_height(t)[..., 0]
         into = np.where(np.isnan(struck), 0.0, np.where(left, -struck, struck))
         deep = (t.memory["deep"][..., 0] > 0.0) | (into > self.depth)
@@ -112,9 +112,9 @@ class Rally(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        crossing: 1 for both when a puck struck from an end crosses the middle line.
+        crossing: 1 for both players for each counted crossing of the centre line.
         """
         counted = t.new_memory["crossings"] - t.memory["crossings"]
         return {"crossing": counted[..., None] * np.ones(2)}
@@ -127,7 +127,7 @@ class Rally(Scenario):
         return {"crossings": memory["crossings"]}
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the puck has crossed the middle ``crossings`` times."""
+        """(...) bool: There have been ``crossings`` counted crossings."""
         return np.asarray(t.new_memory["crossings"] >= self.crossings)
 
 

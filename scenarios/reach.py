@@ -44,13 +44,13 @@ class Reach(GoalScenario):
     version: ClassVar[int] = 1
     seconds: Seconds = 3.0
     radius: Metres = 0.02
-    """Distance that counts as arrival (m)."""
+    """Distance from the goal that counts as arrival, m."""
     speed: Speed = 0.05
-    """Speed below which the paddle is at rest (m/s)."""
+    """Speed below which the paddle is at rest, m/s."""
     hold: Seconds = 0.1
-    """Time that it has to be at rest (s)."""
+    """Time for which the paddle must be at rest, s."""
     far: Metres = 0.15
-    """Shortest initial distance of a goal from the paddle (m)."""
+    """Smallest distance between goal and paddle at the start, m."""
 
     @cached_property
     def scene(self) -> Scene:
@@ -85,17 +85,17 @@ class Reach(GoalScenario):
         }
 
     def _rests(self, memory: Memory) -> Array:
-        """(...) bool: the paddle has been at rest for long enough."""
+        """Return True (...) if the paddle has been at rest for ``hold`` seconds."""
         return np.asarray(memory["still"] >= self.hold - 1e-9)
 
     observation = (observables.OwnPaddle(), observables.Goal((0.2, 0.2), -0.55, "own"))
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        progress: 2 times the metres by which the gap to the goal shrank.
-        time: -0.02 a step.
-        success: 2 once.
+        progress: 2 times the decrease of the distance between paddle and goal, m.
+        time: -0.02 in each step.
+        success: 2, once.
         """
         return {
             "progress": 2.0 * (t.memory["gap"] - t.new_memory["gap"])[..., None],
@@ -107,12 +107,12 @@ class Reach(GoalScenario):
         return self.success(t)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the paddle has come to rest within the radius."""
+        """(...) bool: The paddle has come to rest within ``radius`` of the goal."""
         near = t.new_memory["gap"] < self.radius
         return np.asarray(near & self._rests(t.new_memory))
 
     def paper_success(self, t: Transition) -> Array:
-        """(...) bool: within 0.05 m of the goal, at any speed."""
+        """(...) bool: The paddle is within 0.05 m of the goal, at any speed."""
         return np.asarray(t.new_memory["gap"] < 0.05)
 
     @property

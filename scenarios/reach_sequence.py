@@ -44,9 +44,9 @@ class ReachSequence(Scenario):
     count: int = 5
     """Number of goals."""
     radius: Metres = 0.03
-    """Distance that counts as passage (m)."""
+    """Distance from a goal that counts as passage, m."""
     far: Metres = 0.12
-    """Shortest distance of a goal from the one before, or from the paddle (m)."""
+    """Smallest distance of a goal from the previous one, or from the paddle, m."""
 
     @cached_property
     def scene(self) -> Scene:
@@ -90,7 +90,7 @@ class ReachSequence(Scenario):
         }
 
     def _goal(self, memory: Memory, index: Array) -> Array:
-        """(..., 2) goal of an index; the last one beyond it."""
+        """Return the goal with an index (..., 2), m; the last goal if there is none."""
         kept = np.minimum(index, self.count - 1.0)[..., None]
         mine = kept == np.arange(self.count)
         return np.asarray((memory["goals"] * mine[..., None]).sum(-2))
@@ -102,11 +102,11 @@ class ReachSequence(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        progress: 2 times the metres by which the gap to the goal in turn shrank.
-        passage: 1 for each goal.
-        time: -0.02 a step.
+        progress: 2 times the decrease of the distance from paddle to current goal, m.
+        passage: 1 for each passed goal.
+        time: -0.02 in each step.
         """
         gap = length(t.after.paddle[..., 0, :] - t.memory["goal"])
         return {
@@ -119,7 +119,7 @@ class ReachSequence(Scenario):
         return self.success(t)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the paddle has been at all goals in turn."""
+        """(...) bool: The paddle has passed all goals in order."""
         return np.asarray(t.new_memory["passed"] >= self.count)
 
     def targets(self, memory: Memory) -> Array | None:

@@ -48,17 +48,17 @@ class ReachVelocity(GoalScenario):
     version: ClassVar[int] = 1
     seconds: Seconds = 5.0
     radius: Metres = 0.04
-    """Distance that counts as arrival (m)."""
+    """Distance from the goal that counts as arrival, m."""
     error: Speed = 0.10
-    """Largest error of the velocity (m/s)."""
+    """Largest error of the velocity, m/s."""
     window: Seconds = 0.2
-    """Time of the pass, from the first entry of the circle (s)."""
+    """Duration of the pass, from the first entry of the circle, s."""
     slow: Speed = 0.2
-    """Lowest target speed at the goal (m/s)."""
+    """Lowest target speed at the goal, m/s."""
     fast: Speed = 0.5
-    """Highest target speed at the goal (m/s)."""
+    """Highest target speed at the goal, m/s."""
     margin: Metres = 0.08
-    """Least distance of a goal from every edge of the reach (m)."""
+    """Smallest distance of the goal from every edge of the workspace, m."""
 
     @cached_property
     def scene(self) -> Scene:
@@ -105,12 +105,12 @@ class ReachVelocity(GoalScenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        progress: metres by which the gap to the goal shrank.
-        score: 3 times the gain in the best score of position and velocity together.
-        time: -0.02 a step.
-        success: 2 once.
+        progress: Decrease of the shortest distance between paddle and goal so far, m.
+        score: 3 times the increase of the best score of position and velocity so far.
+        time: -0.02 in each step.
+        success: 2, once.
         """
         return {
             "progress": (t.memory["gap"] - t.new_memory["gap"])[..., None],
@@ -124,14 +124,15 @@ class ReachVelocity(GoalScenario):
         return np.asarray(self.success(t) | over)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the paddle has matched the goal in position and velocity."""
+        """(...) bool: The paddle met the goal in position and velocity in one step."""
         return t.new_memory["passed"]
 
     def paper_success(self, t: Transition) -> Array:
-        """(...) bool: nearer than a tenth of the diagonal, at a similar velocity.
+        """(...) bool: The paddle is close to the goal, with a similar velocity.
 
-        The velocity's score is the mean of (1 + cosine) / 2 and of 1 less the error of
-        the speed over 2.83 m/s; it has to be 0.8.
+        The distance is at most a tenth of the table's diagonal. The score of the
+        velocity is at least 0.8. It is the mean of (1 + cosine) / 2 and
+        1 - (error of the speed) / (2.83 m/s).
         """
         gap = length(t.after.paddle[..., 0, :] - t.memory["goal"])
         velocity, wanted = t.after.paddle_velocity[..., 0, :], t.memory["goal_velocity"]

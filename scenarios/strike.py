@@ -41,9 +41,9 @@ class Strike(Scenario):
 
     seconds: Seconds = 2.0
     fast: Speed = 0.8
-    """Wanted speed of the puck (m/s)."""
+    """Speed of the puck for a success, m/s."""
     distance: Metres = 0.3
-    """Wanted distance of the puck from its start (m)."""
+    """Distance of the puck from its start for a success, m."""
 
     @cached_property
     def scene(self) -> Scene:
@@ -84,12 +84,12 @@ class Strike(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        approach: metres by which the paddle came nearer to the puck than before.
-        speed: m/s by which the puck was faster than before.
-        time: -0.01 a step.
-        success: 2 once.
+        approach: Decrease of the shortest distance between paddle and puck so far, m.
+        speed: Increase of the highest speed of the puck so far, m/s.
+        time: -0.01 in each step.
+        success: 2, once.
         """
         return {
             "approach": rewards.approach(t),
@@ -102,11 +102,11 @@ class Strike(Scenario):
         return t.new_memory["struck"]
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the puck was fast and far from the paddle in one step."""
+        """(...) bool: The puck was fast and far from its start in the same step."""
         return t.new_memory["struck"]
 
     def paper_success(self, t: Transition) -> Array:
-        """(...) bool: the puck is faster than 0.2 m/s."""
+        """(...) bool: The puck is faster than 0.2 m/s."""
         return np.asarray(length(t.after.puck_velocity[..., 0, :]) > 0.2)
 
 

@@ -26,7 +26,7 @@ from marl_airhockey.toolkit import (
 
 ROWS = 5
 GAP = 0.004
-"""Distance between neighbouring blocks of the triangle (m)."""
+"""Distance between neighbouring blocks of the triangle, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ class StrikeCrowd(Scenario):
 
     seconds: Seconds = 7.5
     spread: Metres = 0.08
-    """Wanted sum of displacements (m); a shot at 1.04 m/s gives 0.10 to 0.12."""
+    """Sum of displacements for a success, m. A shot at 1.04 m/s gives 0.10 to 0.12."""
     shape: Literal["disc", "square"] = "disc"
     """Shape of the blocks."""
 
@@ -109,14 +109,15 @@ class StrikeCrowd(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        approach: metres by which the paddle came nearer to the puck than before.
-        rise: half of the m/s by which the struck puck climbed faster than before.
-        spread: 4 times the metres by which the blocks, summed, are further from their
-        places than before.
-        time: -0.01 a step.
-        success: 3 once.
+        approach: Decrease of the shortest distance between paddle and puck so far, m.
+        rise: 0.5 times the increase of the highest upward speed of the touched puck so
+        far, m/s.
+        spread: 4 times the increase of the largest sum of displacements of the blocks
+        so far, m.
+        time: -0.01 in each step.
+        success: 3, once.
         """
         return {
             "approach": rewards.approach(t),
@@ -130,11 +131,11 @@ class StrikeCrowd(Scenario):
         return self.success(t)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the blocks have moved by ``spread`` in all."""
+        """(...) bool: The blocks have been displaced by ``spread`` in total."""
         return np.asarray(t.new_memory["spread"] >= self.spread)
 
     def paper_success(self, t: Transition) -> Array:
-        """(...) bool: displacements add up to a tenth of the diagonal."""
+        """(...) bool: After 0.15 s, displacements sum to a tenth of the diagonal."""
         spread = length(t.after.block - t.memory["origin"]).sum(-1)
         tenth = 0.1 * np.hypot(*self.table_geometry.size)
         return np.asarray((spread > tenth) & (t.after.time > 0.15))

@@ -48,13 +48,13 @@ class TeamJuggle(Scenario):
     pucks: Pucks = 1
     """Number of pucks."""
     lift: Metres = 0.2
-    """Height to which a hit must raise the puck's centre (m)."""
+    """Height by which a hit must raise the puck's centre, m."""
     passes: int = 8
-    """Number of paid hits that is a success."""
+    """Number of rewarded hits for a success."""
     gap: Metres = 0.10
-    """Distance between the reaches of the seats (m)."""
+    """Distance between the workspaces of the players, m."""
     lift_weight: Weight = 0.0
-    """Reward of both for any hit that raises a puck by ``lift``, paid or not."""
+    """Additional reward of both players for any hit that raises a puck by ``lift``."""
 
     @cached_property
     def scene(self) -> Scene:
@@ -110,10 +110,10 @@ class TeamJuggle(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        pass: 1 for both when the puck, raised by one paddle, is raised by the other.
-        lift: ``lift_weight`` for both when any hit has raised a puck.
+        pass: 1 for both players when one raises a puck that the other raised last.
+        lift: ``lift_weight`` for both players for any hit that raises a puck.
         """
         passed = t.new_memory["passes"] - t.memory["passes"]
         terms = {"pass": passed[..., None] * np.ones(2)}
@@ -129,7 +129,7 @@ class TeamJuggle(Scenario):
         return {"passes": memory["passes"]}
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the puck has been passed up ``passes`` times in alternation."""
+        """(...) bool: There have been ``passes`` hits in alternation."""
         return np.asarray(t.new_memory["passes"] >= self.passes)
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:

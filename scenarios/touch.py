@@ -34,11 +34,11 @@ class Touch(FallingPuck):
         return {"gap": rewards.nearest(t)}
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        approach: metres by which the paddle came nearer to the puck than before.
+        approach: Decrease of the shortest distance between paddle and puck so far, m.
         touch: 1 for each distinct touch.
-        drop: -1 when the puck passes the home line.
+        drop: -1 when the puck crosses the home line.
         """
         return {
             "approach": rewards.approach(t),
@@ -50,11 +50,11 @@ class Touch(FallingPuck):
         return rewards.lost(t)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: any distinct touch."""
+        """(...) bool: A distinct touch has happened."""
         return rewards.touched(t.new_memory)
 
     def paper_success(self, t: Transition) -> Array:
-        """(...) bool: within 0.02 m of a touch."""
+        """(...) bool: Paddle and puck are within 0.02 m of a touch."""
         gap = length(t.after.puck[..., 0, :] - t.after.paddle[..., 0, :])
         table = self.table_geometry
         return np.asarray(gap < table.paddle_radius + table.puck_radius + 0.02)

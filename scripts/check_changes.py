@@ -1,11 +1,11 @@
-"""Check what has changed since main: lint of those files, and the tests beside them.
+"""Check the changes since main: lint of the changed files, and their tests.
 
     make check
 
-The tests of ``marl_airhockey/sim/sensing/delay.py`` are those of
-``tests/sim/sensing/test_delay.py``, or all of the folder if there is no such file. A
-scenario or driver gets its part of ``tests/suites``. This is for use while editing;
-``make test`` is the whole short run.
+The tests of ``marl_airhockey/sim/sensing/delay.py`` are in
+``tests/sim/sensing/test_delay.py``, or in its whole folder if there is no such file. A
+scenario or driver runs its part of ``tests/suites``. Use this command while editing;
+``make test`` runs all short tests.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ TOOLS = Path(sys.executable).parent
 
 
 def changed() -> list[Path]:
-    """Return the files that differ from main, new ones included."""
+    """Return the files that differ from main, including new ones."""
 
     def git(*words: str) -> list[str]:
         done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True)
@@ -47,13 +47,13 @@ def tests_of(path: Path) -> Path | None:
 
 
 def run(*command: str | Path) -> bool:
-    """Run a command in the project's folder; return whether it fails."""
+    """Run a command in the folder of the project; return True if it fails."""
     print("$", *(Path(word).name if i == 0 else word for i, word in enumerate(command)))
     return subprocess.run([*map(str, command)], cwd=ROOT, check=False).returncode != 0
 
 
 def main() -> None:
-    """Check all that has changed; the exit status is 1 if anything fails."""
+    """Check all changes; the exit status is 1 if anything fails."""
     files = changed()
     python = [str(path.relative_to(ROOT)) for path in files if path.suffix == ".py"]
     if not files:
@@ -66,7 +66,7 @@ def main() -> None:
         failed |= run(TOOLS / "lint-imports", "--no-logo", "--no-cache")
         failed |= run(TOOLS / "mypy")
     tests = {str(t.relative_to(ROOT)) for t in map(tests_of, files) if t is not None}
-    # A folder holds its files.
+    # A folder includes its files.
     tests = {t for t in tests if str(Path(t).parent) not in tests}
     # The tests of the lab run alone, because it runs in real time.
     lab = {t for t in tests if t.startswith("tests/hardware/lab")}

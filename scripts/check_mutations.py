@@ -1,11 +1,10 @@
-"""Apply small faults to a copy of the project and see whether the short tests notice.
+"""Apply small faults to a copy of the project and check that the short tests fail.
 
-    python scripts/check_mutations.py            # all of them, some minutes
-    python scripts/check_mutations.py drag gae   # those
+    python scripts/check_mutations.py            # all faults, some minutes
+    python scripts/check_mutations.py drag gae   # faults with these words in the name
 
-Each fault is one edit of one file. The tests that belong to it are run as `make test`
-runs them, without those that are slow. A fault that no test notices has survived, and
-the exit status is 1.
+Each fault is one edit of one file. Its tests are run as in `make test`, without the
+slow ones. A fault survives if no test fails; the exit status is then 1.
 """
 
 from __future__ import annotations
@@ -30,12 +29,12 @@ class Fault(NamedTuple):
 
     name: str
     file: str
-    """Path in the project"""
+    """Path in the project."""
     old: str
-    """Text that is there once"""
+    """Text that the file contains exactly once."""
     new: str
     tests: str
-    """Paths in ``tests``, separated by spaces"""
+    """Paths in ``tests``, separated by spaces."""
 
 
 FAULTS = [
@@ -267,19 +266,19 @@ FAULTS = [
 
 
 def faults_of(faults: Sequence[Fault]) -> list[str]:
-    """Return what is wrong with faults: a text that is not there once, or no test."""
+    """Return errors of faults: a text that is not there exactly once, or no test."""
     wrong = []
     for fault in faults:
         path = ROOT / fault.file
         if not path.exists() or path.read_text().count(fault.old) != 1:
-            wrong.append(f"{fault.name}: its text is not in {fault.file} once")
+            wrong.append(f"{fault.name}: {fault.file} must contain its text once")
         paths = [ROOT / "tests" / name for name in fault.tests.split()]
-        wrong += [f"{fault.name}: there is no {p}" for p in paths if not p.exists()]
+        wrong += [f"{fault.name}: {p} does not exist" for p in paths if not p.exists()]
     return wrong
 
 
 def copied(folder: Path) -> None:
-    """Copy what git knows of the project, and new files, into a folder."""
+    """Copy the files that git lists, and new files, into a folder."""
     listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
     done = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True)
     for name in done.stdout.splitlines():
@@ -290,7 +289,7 @@ def copied(folder: Path) -> None:
 
 
 def tested(folder: Path, cache: Path, tests: str) -> subprocess.CompletedProcess[str]:
-    """Run some tests of a copy until the first fails."""
+    """Run some tests of a copy until the first failure."""
     paths = [f"tests/{path}" for path in tests.split()]
     command = [sys.executable, "-m", "pytest", "-x", "-m", "not slow", *paths]
     variables = {"PYTHONPATH": str(folder), "MARL_AIRHOCKEY_CACHE": str(cache)}
@@ -311,7 +310,7 @@ def failed_test(output: str) -> str:
 
 
 def survives(fault: Fault, folder: Path, cache: Path) -> bool:
-    """Apply a fault, run its tests, print what happened, and take it back."""
+    """Apply a fault, run its tests, print the result, and remove the fault."""
     path = folder / fault.file
     text, began = path.read_text(), time.monotonic()
     path.write_text(text.replace(fault.old, fault.new))
@@ -328,7 +327,7 @@ def survives(fault: Fault, folder: Path, cache: Path) -> bool:
 
 
 def main() -> None:
-    """Apply the faults that the command line names, or all."""
+    """Apply the faults that the command line names, or all of them."""
     words = sys.argv[1:]
     faults = [f for f in FAULTS if not words or any(word in f.name for word in words)]
     if wrong := faults_of(faults):
@@ -336,7 +335,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder, cache = Path(name) / "project", Path(name) / "cache"
         copied(folder)
-        # Faults outside of compiled code find it compiled.
+        # Faults outside of compiled code use the compiled code of the project.
         shutil.copytree(cache_folder(), cache, symlinks=True)
         survivors = [fault.name for fault in faults if survives(fault, folder, cache)]
     print(f"{len(faults) - len(survivors)} of {len(faults)} faults killed")

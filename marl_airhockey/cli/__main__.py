@@ -1,4 +1,4 @@
-"""Entry of ``python -m marl_airhockey.cli``."""
+"""Entry point of ``python -m marl_airhockey.cli``."""
 
 from marl_airhockey.cli.main import main
 

@@ -19,28 +19,49 @@ from marl_airhockey.sim.core.errors import require
 
 
 def bench_environments(
-    scenario: Annotated[str, typer.Option(help="Comma-separated.")] = "juggle",
-    backend: Annotated[str, typer.Option(help="Comma-separated.")] = "numba,pymunk",
+    scenario: Annotated[
+        str, typer.Option(help="Names of scenarios, separated by commas.")
+    ] = "juggle",
+    backend: Annotated[
+        str,
+        typer.Option(
+            help="Backends, separated by commas: numba, pymunk and robosuite."
+        ),
+    ] = "numba,pymunk",
     worlds: Annotated[
-        str, typer.Option(help="Comma-separated; 0 is the PettingZoo dict environment.")
+        str,
+        typer.Option(
+            help="Numbers of worlds, separated by commas; 0 is the PettingZoo "
+            "environment of one world."
+        ),
     ] = "0,1,64,1024,4096",
-    rounds: Annotated[int, typer.Option(help="Rounds; each measures every case.")] = 3,
+    rounds: Annotated[
+        int,
+        typer.Option(help="Number of rounds; each round measures every case once."),
+    ] = 3,
     seconds: Annotated[
-        float, typer.Option(help="CPU-seconds of a case in a round.")
+        float, typer.Option(help="Duration of one measurement, CPU-seconds.")
     ] = 1.0,
-    out: Annotated[Path | None, typer.Option(help="Draw a PNG here.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="PNG file to write with a plot of the rates.")
+    ] = None,
     num_workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure env-steps per second, of CPU and of time."""
+    """Measure environment steps per CPU-second and per second of wall time."""
     from marl_airhockey.evaluation.speed import Case, measure_speed, plot_speed
 
     try:
         numbers = [int(n) for n in worlds.split(",")]
     except ValueError:
-        raise ValueError(f"--worlds: {worlds!r} must be numbers and commas") from None
+        raise ValueError(
+            f"--worlds {worlds!r}: expected whole numbers, separated by commas"
+        ) from None
     if min(numbers) < 0 or rounds < 1 or seconds <= 0:
-        raise ValueError("--worlds, --rounds and --seconds must not be negative or 0")
+        raise ValueError(
+            "expected --worlds of at least 0, --rounds of at least 1 and --seconds "
+            "above 0"
+        )
     cases = [
         Case(s, b, n)
         for s in scenario.split(",")

@@ -24,27 +24,30 @@ def challenge(
     policy: Annotated[
         str,
         typer.Argument(
-            help="A driver, a policy, a folder of policies by task (juggle.npz, "
-            "juggle_ur5e.npz), or zoo."
+            help="Name of a driver, path of a policy, folder of policies by task "
+            "(juggle.npz, juggle_ur5e.npz), or zoo."
         ),
     ],
     name: Annotated[
-        str | None, typer.Option(help="Name on the card; else POLICY.")
+        str | None, typer.Option(help="Name on the result card; by default POLICY.")
     ] = None,
     out: Annotated[
-        Path, typer.Option(file_okay=False, help="Folder of the card.")
+        Path, typer.Option(file_okay=False, help="Folder of the result card.")
     ] = Path("runs/challenge"),
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
-    """Play the ten tasks in three profiles and duels: one card to compare."""
+    """Play the ten tasks in three profiles, and duels, and write a result card.
+
+    The protocol is fixed, so that the cards of different policies can be compared.
+    """
     require("matplotlib", "train")
     with bar() as progress:
         total = len(TASKS) * len(PROFILES) + len(FIELD)
         task = progress.add_task("challenge", total=total, note="")
 
         def report(result: ChallengeResult) -> None:
-            """Show the progress."""
+            """Update the progress bar."""
             what = f"{result.scenario} {result.opponent or result.profile}"
             progress.update(task, advance=1, note=f"{what} {result.score:.2f}")
 

@@ -23,15 +23,25 @@ from marl_airhockey.registry import make_driver
 
 @in_environment
 def crossplay(
-    scenario: Annotated[str, typer.Argument(help="A game of teams of two or more.")],
-    players: Annotated[list[str], typer.Argument(help="Drivers and policies.")],
+    scenario: Annotated[
+        str, typer.Argument(help="Name of a game with teams of two or more.")
+    ],
+    players: Annotated[
+        list[str], typer.Argument(help="Names of drivers and paths of policies.")
+    ],
     environment: SimulationOptions,
-    episodes: Annotated[int, typer.Option(help="Episodes of each pair.", min=1)] = 200,
+    episodes: Annotated[
+        int, typer.Option(help="Number of episodes of each pair.", min=1)
+    ] = 200,
     driver: Drivers = None,
     seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = TEST_SEED,
     as_json: AsJson = False,
 ) -> None:
-    """Let players play with teammates that they do not know: the coordination gap."""
+    """Measure how well players coordinate with teammates that they do not know.
+
+    Every player plays with itself and with every other player. The coordination gap is
+    the difference between the two mean returns.
+    """
     keywords = environment.keywords
     if driver:
         keywords["drivers"] = settings(driver)
@@ -62,7 +72,7 @@ def crossplay(
 
 
 def table(found: CrossPlay) -> Table:
-    """Return the returns of all pairs, success in brackets; teammates are columns."""
+    """Return a table of return and success of all pairs; columns are teammates."""
     shown = Table("player", *found.names, title="return (success) with the teammate")
     for name, returns, success in zip(
         found.names, found.returns, found.success, strict=True

@@ -1,4 +1,4 @@
-"""Options of the environment in which a command plays, simulated or a real table."""
+"""Options of the environment that a command uses: simulated or a real table."""
 
 from __future__ import annotations
 
@@ -37,31 +37,33 @@ from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.world.keywords import Keywords
 
 SUFFIX = "_full_size"
-"""Ending of the names of policies of the zoo that were trained for the real table"""
+"""Suffix of the names of zoo policies that were trained for the real table."""
 
 Observe = Annotated[
     str | None,
     typer.Option(
-        help="Form of observations: velocity, estimate or history; by default that of "
-        "the policy's training."
+        help="Observation type: velocity, estimate or history; by default the type "
+        "with which the policy was trained."
     ),
 ]
 ControlDt = Annotated[
     float | None,
     typer.Option(
-        help="Time between two actions, s; by default that of the policy's training, "
-        "else 0.05."
+        help="Time between two actions, s; by default the time with which the policy "
+        "was trained, else 0.05."
     ),
 ]
 LabOption = Annotated[
     bool,
     typer.Option(
-        "--lab", help="Of --backend real: the virtual lab, started if none runs."
+        "--lab",
+        help="Use the virtual lab as the real table; a lab is started if none is "
+        "running.",
     ),
 ]
 RigOption = Annotated[
     Path | None,
-    typer.Option(help="Of --backend real: file of the devices and their calibration."),
+    typer.Option(help="Rig file of a real table: its devices and their calibration."),
 ]
 
 
@@ -78,7 +80,7 @@ class SimulationOptions:
 
     @property
     def keywords(self) -> Keywords:
-        """Keywords of the environment that were given."""
+        """Keywords of the environment for the options that were given."""
         keywords: Keywords = {"backend": self.backend}
         if self.profile is not None:
             keywords["profile"] = self.profile
@@ -102,7 +104,7 @@ class EnvironmentOptions(SimulationOptions):
 
     @property
     def keywords(self) -> Keywords:
-        """Keywords of the environment that were given."""
+        """Keywords of the environment for the options that were given."""
         keywords = super().keywords
         if self.driver:
             keywords["drivers"] = settings(self.driver)
@@ -111,9 +113,9 @@ class EnvironmentOptions(SimulationOptions):
         return keywords
 
     def on_table(self, driver: str) -> str:
-        """Return the policy of the zoo that is for the real table, if that is played.
+        """Return the name of the zoo policy that was trained for the real table.
 
-        Other drivers are returned as they are.
+        If the backend is not "real", or there is no such policy, return the given name.
         """
         own = f"{driver}{SUFFIX}"
         return own if self.backend == REAL and own in zoo_names() else driver
@@ -121,12 +123,13 @@ class EnvironmentOptions(SimulationOptions):
     def one_driver(
         self, name: str, scenario: str | None, quiet: bool = False
     ) -> tuple[str, Driver, str, Keywords]:
-        """Return a driver for this environment, and what it plays.
+        """Return a driver for this environment, with the scenario and the keywords.
 
         Args:
             name: Name of a driver, or path of a policy.
-            scenario: Scenario that was given; None for that of training.
-            quiet: See `as_trained_unless_given`.
+            scenario: Scenario that was given; None for the scenario of its training.
+            quiet: True to print the environment to standard error, see
+                `as_trained_unless_given`.
 
         Returns:
             Name of the driver on this table, driver, scenario and keywords.
@@ -139,13 +142,14 @@ class EnvironmentOptions(SimulationOptions):
 
     @contextmanager
     def table(self, keywords: Keywords) -> Iterator[Keywords]:
-        """Give the keywords with what a real table needs, while its lab runs.
+        """Yield the keywords of the environment on its table, while the lab runs.
 
         Args:
             keywords: Keywords of the environment.
 
         Raises:
-            ValueError: A table without the backend, or both, or none with it.
+            ValueError: --lab or --rig was given without the backend "real", or this
+                backend without exactly one of them.
             RuntimeError: The lab does not start.
         """
         if self.backend == REAL:
@@ -153,13 +157,13 @@ class EnvironmentOptions(SimulationOptions):
                 yield table_keywords({**keywords, "rig": str(path)})
             return
         if self.lab or self.rig:
-            raise ValueError("--lab and --rig: add --backend real")
+            raise ValueError("--lab and --rig need --backend real")
         yield keywords
 
 
 @dataclass(frozen=True, kw_only=True)
 class TableOptions(EnvironmentOptions):
-    """The same for commands that are for a real table unless another is given."""
+    """Options of an environment with a real table as the default backend."""
 
     backend: Backend = REAL
 
@@ -168,7 +172,7 @@ def in_environment(command: Callable[..., None]) -> Callable[..., None]:
     """Return a command that takes the fields of its ``environment`` as options.
 
     Args:
-        command: Function with a parameter of that name, of a class above.
+        command: Function with a parameter ``environment`` of one of the classes above.
     """
     hints = typing.get_type_hints(command, include_extras=True)
     kind = hints["environment"]
@@ -206,16 +210,16 @@ def as_trained_unless_given(
     keywords: Keywords,
     quiet: bool = False,
 ) -> tuple[str, Keywords, dict[str, Driver]]:
-    """Fill in what was not given from what the players were trained in, and print it.
+    """Complete scenario and keywords with those of the drivers' training; print them.
 
     Args:
         players: Drivers by name.
         scenario: Scenario, if it was given.
         keywords: Keywords that were given.
-        quiet: Whether the line goes to standard error, as the output is JSON.
+        quiet: True to print to standard error, because the output is JSON.
 
     Returns:
-        Scenario, keywords, and the players with the observations that were given.
+        Scenario, keywords, and the drivers with the observation type that was given.
     """
     found, keywords = as_trained(players, scenario, keywords)
     assert isinstance(found, str)
@@ -228,7 +232,7 @@ def as_trained_unless_given(
 
 
 def _in_panel(annotation: Any) -> Any:
-    """Return the annotation of an option that the help shows in a panel of its own."""
+    """Return the annotation of an option with the help panel "Environment"."""
     kind, option = typing.get_args(annotation)
     option = copy(option)
     option.rich_help_panel = "Environment"
@@ -237,26 +241,26 @@ def _in_panel(annotation: Any) -> Any:
 
 @contextmanager
 def rig_of(lab: bool, rig: Path | None) -> Iterator[Path]:
-    """Give the file of the devices of a real table, while its lab runs.
+    """Yield the rig file of a real table, while the lab runs.
 
     Args:
-        lab: whether the table is the virtual lab's.
-        rig: file of the devices of another.
+        lab: True for the virtual lab.
+        rig: Rig file of another table.
 
     Raises:
-        ValueError: both, or none.
-        RuntimeError: the lab does not start.
+        ValueError: Both are given, or none.
+        RuntimeError: The lab does not start.
     """
     if lab and rig:
-        raise ValueError("--lab, --rig: one table at a time")
+        raise ValueError("--lab and --rig are two tables; give one of them")
     if rig:
         yield rig
         return
     if not lab:
-        raise ValueError("which real table? --lab, or --rig FILE")
+        raise ValueError("no real table was given; add --lab or --rig FILE")
     from marl_airhockey.hardware.calibration.lab_rig import lab_rig
 
-    with waiting("opening the lab (longer when it is the first time)"):
+    with waiting("opening the lab (the first time takes longer)"):
         opened = lab_rig()
         path = opened.__enter__()
     try:

@@ -1,4 +1,4 @@
-"""Command ``airhockey evaluate``, and its table of results."""
+"""Command ``airhockey evaluate`` and its table of results."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from marl_airhockey.policies.policy import Policy
 from marl_airhockey.registry import REAL, make_driver
 
 FLOORS = ("still", "random", "sticky")
-"""Drivers without skill that results are compared with."""
+"""Names of the baselines: drivers without skill."""
 
 
 @in_environment
@@ -40,26 +40,31 @@ def evaluate_driver(
         typer.Argument(
             metavar="DRIVER...",
             help="Name of a driver, path of a policy, or folder of a recording. "
-            "Several runs, of different seeds, are summed up with an interval over "
-            "them.",
+            "Several runs with different seeds also give a mean with an interval over "
+            "the runs.",
         ),
     ],
     environment: EnvironmentOptions,
     scenario: Scenario = None,
     episodes: Annotated[int, typer.Option(help="Number of episodes.", min=1)] = 200,
     seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = TEST_SEED,
-    floors: Annotated[bool, typer.Option(help="still, random, sticky too.")] = True,
+    floors: Annotated[
+        bool,
+        typer.Option(help="Evaluate the baselines still, random and sticky, too."),
+    ] = True,
     num_workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure a driver over episodes that training never sees.
+    """Evaluate a driver on episodes that are not part of any training.
 
-    A policy plays what it was trained in, unless an option says otherwise.
+    A policy is evaluated in the environment in which it was trained, unless an option
+    changes it. A policy that can sample its actions is evaluated with and without
+    sampling.
 
-    On a real table, or in the virtual lab, the driver plays alone: no floors, and a
-    policy does not sample.
+    On a real table and in the virtual lab there are no baselines, and a policy does not
+    sample its actions.
 
-    A recording is measured as it was played; options of the environment have no effect.
+    For a recording, the options of the environment have no effect.
     """
     recorded = [is_recording(Path(name)) for name in drivers]
     if all(recorded):
@@ -67,7 +72,7 @@ def evaluate_driver(
         return
     if any(recorded):
         raise ValueError(
-            "recordings and drivers: evaluate them by commands of their own"
+            "recordings and drivers cannot be evaluated together; use two commands"
         )
     names = [environment.on_table(name) for name in drivers]
     scenario, keywords, players = as_trained_unless_given(
@@ -108,7 +113,7 @@ def evaluate_driver(
 def _report(
     results: list[EvaluationResult], runs: OverRuns | None, as_json: bool
 ) -> None:
-    """Print results, those of the floors after that of the driver."""
+    """Print the results; those of the baselines follow that of the driver."""
     if as_json:
         main_result = results[0].to_json()
         for result in results[1:]:

@@ -1,4 +1,4 @@
-"""Commands ``airhockey fit | fit-table``: the 2D table's physics, fitted to play."""
+"""Commands ``airhockey fit | fit-table``, which fit the physics of the 2D table."""
 
 from __future__ import annotations
 
@@ -18,31 +18,46 @@ from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.system_id.table_fit import FittedTable
 
-FitFile = Annotated[Path, typer.Option(help="File to write.")]
+FitFile = Annotated[Path, typer.Option(help="TOML file to write.")]
 
 
 def fit(
     scenario: Annotated[
-        str, typer.Argument(help="Scenario that is played, without blocks.")
+        str, typer.Argument(help="Name of a scenario without blocks.")
     ] = "juggle",
     driver: Annotated[
-        str | None, typer.Option(help="Driver; by default the zoo's policy.")
+        str | None,
+        typer.Option(help="Driver that plays; by default the policy zoo/SCENARIO."),
     ] = None,
-    backend: Annotated[str, typer.Option(help="Backend of the play.")] = "robosuite",
+    backend: Annotated[
+        str,
+        typer.Option(
+            help="Backend on which the driver plays: numba, pymunk or robosuite."
+        ),
+    ] = "robosuite",
     physics: Physics = None,
     recordings: Annotated[
         Path | None,
         typer.Option(
-            file_okay=False, help="Folder of recordings of play, instead of playing."
+            file_okay=False,
+            help="Folder of recordings to fit to; no driver plays then.",
         ),
     ] = None,
-    steps: Annotated[int, typer.Option(help="Control steps of play.", min=1)] = 3000,
-    seed: Annotated[int, typer.Option(help="Seed of the play.")] = 0,
+    steps: Annotated[
+        int, typer.Option(help="Number of control steps that the driver plays.", min=1)
+    ] = 3000,
+    seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = 0,
     out: FitFile = Path("fit.toml"),
 ) -> None:
-    """Fit the 2D table's physics to play on another one, for --physics FILE."""
+    """Fit the physics of the 2D table to episodes on another backend.
+
+    The file that is written is a value of --physics.
+    """
     if scenario.endswith(".csv"):
-        raise ValueError(f"fit: rows of a table are for airhockey fit-table {scenario}")
+        raise ValueError(
+            "fit: expected the name of a scenario; for a CSV file use "
+            f"airhockey fit-table {scenario}"
+        )
     from marl_airhockey.data.files import recordings_in
     from marl_airhockey.system_id.recorded_play import load_recordings, record_play
     from marl_airhockey.system_id.system_id import fit_physics
@@ -59,17 +74,15 @@ def fit(
         found = fit_physics(seen)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(found.to_toml())
-    shown = Table("", "usual values", "fitted", title=f"{found.segments} segments")
+    shown = Table("", "default values", "fitted", title=f"{found.segments} segments")
     for name, value in found.physics.items():
         usual = seen.scene.defaults.get(name, PARAMETERS[name].default)
         shown.add_row(f"{name}, {PARAMETERS[name].unit}", f"{usual:g}", f"{value:.4g}")
-    for k, name in enumerate(("pucks off, mm", "paddles off, mm")):
+    for k, name in enumerate(("error of pucks, mm", "error of paddles, mm")):
         errors = (f"{1000 * x[k]:.2f}" for x in (found.before, found.after))
         shown.add_row(name, *errors)
     console.print(shown)
-    console.print(
-        f"{found.error_reduction:.0%} of the pucks' error is gone; wrote {out}"
-    )
+    console.print(f"{found.error_reduction:.0%} less error of the pucks; wrote {out}")
 
 
 def fit_table(
@@ -77,30 +90,40 @@ def fit_table(
         list[Path],
         typer.Argument(
             metavar="FILE.csv...",
-            help="Rows t,x,y (s, m) of a real table, optionally with "
-            "paddle_x,paddle_y.",
+            help="CSV files of a real table with the columns t,x,y (s, m), and "
+            "optionally paddle_x,paddle_y (m).",
         ),
     ],
     table: Annotated[
-        str, typer.Option(help="Table of the rows, by name.")
+        str,
+        typer.Option(
+            help="Preset of the table: standard, full_size, ubc_pro or ubc_wood."
+        ),
     ] = "standard",
     origin: Annotated[
-        str, typer.Option(help="Origin of the rows: centre, or corner (least x and y).")
+        str,
+        typer.Option(
+            help="Origin of x and y: centre, or corner (the one with the smallest x "
+            "and y)."
+        ),
     ] = "centre",
     base: Annotated[
         str | None,
-        typer.Option(help="Write a profile for --profile, with the rest of this one."),
+        typer.Option(
+            help="Profile that supplies the parameters that are not fitted. The file "
+            "is then a value of --profile, else of --physics."
+        ),
     ] = None,
     delays: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Output of calibrate delay --json or calibrate arm --json, for the "
-            "profile of --base; repeatable."
+            help="File with the output of calibrate delay --json or calibrate arm "
+            "--json; needs --base. Can be repeated."
         ),
     ] = None,
     out: FitFile = Path("fit.toml"),
 ) -> None:
-    """Fit the physics of a real table to rows of play on it."""
+    """Fit the physics of a real table to measured trajectories of the puck."""
     from marl_airhockey.system_id.corrected_fit import fit_corrected
     from marl_airhockey.system_id.profile_file import profile_toml, read_delays
     from marl_airhockey.system_id.track import read_track
@@ -110,14 +133,14 @@ def fit_table(
     if base is not None and base not in PROFILES:
         raise ValueError(f"--base: {unknown_name('profile', base, PROFILES)}")
     if delays and base is None:
-        raise ValueError("--delays: add --base, the profile that has the rest")
+        raise ValueError("--delays needs --base, the profile of all other parameters")
     measured = read_delays(delays) if delays else None
     with waiting("fitting"):
         tracks = [read_track(path, TABLES[table], origin) for path in rows]
         found = fit_corrected(tracks, TABLES[table])
     if not found.found and base is None:
         reasons = "; ".join(f"{name}: {why}" for name, why in found.missing.items())
-        raise ValueError(f"nothing of the table could be identified: {reasons}")
+        raise ValueError(f"no parameter of the table could be identified: {reasons}")
     count = sum(len(track.time) for track in tracks)
     what = f"{table}, fitted to {count} rows of play"
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -129,7 +152,7 @@ def fit_table(
 
 
 def _fitted(found: FittedTable, table: str) -> Table:
-    """Return a table of fitted parameters with their intervals."""
+    """Return a table of the fitted parameters with their 95 % intervals."""
     shown = Table("", "fitted", "95 % interval", "flights or bounces", title=table)
     lines = [(f"{n}, {PARAMETERS[n].unit}", e) for n, e in found.found.items()]
     lines += [(f"wall_restitution, side {k}", e) for k, e in found.by_side.items()]

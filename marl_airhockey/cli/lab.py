@@ -18,62 +18,75 @@ from marl_airhockey.registry import REAL, find_backend
 from marl_airhockey.sim.core.errors import require
 
 GAME, PLAYER = "juggle", "zoo/juggle"
-"""Scenario and player of the demo"""
+"""Scenario and policy of the demo."""
 
-lab = typer.Typer(help="The virtual lab: a table, a camera and a UR5e over a network.")
+lab = typer.Typer(
+    help="Run the virtual lab until Ctrl+C: an emulated table, camera and UR5e.\n\n"
+    "Other commands use it with --backend real --lab. --host, --port and --browser "
+    "apply to the page of --demo."
+)
 
 
 @lab.callback(invoke_without_command=True)
 def open_lab(
     context: typer.Context,
-    seed: Annotated[int, typer.Option(help="Of what its table is like.")] = 0,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the sampled physics of the table.")
+    ] = 0,
     frame_rate: Annotated[
-        float, typer.Option(help="Pictures a second.", min=1.0, max=60.0)
+        float,
+        typer.Option(help="Frame rate of the camera, frames/s.", min=1.0, max=60.0),
     ] = 30.0,
     plant: Annotated[
-        str, typer.Option(help="Backend that moves the puck: numba, pymunk, robosuite.")
+        str,
+        typer.Option(
+            help="Physics engine of the emulated table: numba, pymunk or robosuite."
+        ),
     ] = LabSetup.plant,
     demo: Annotated[
-        bool, typer.Option("--demo", help="Let the learned juggler play, on a page.")
+        bool,
+        typer.Option(
+            "--demo",
+            help="Show a trained policy that juggles, on a page in the browser.",
+        ),
     ] = False,
     host: cli_play.Host = "127.0.0.1",
     port: cli_play.Port = 8480,
     browser: cli_play.Browser = True,
 ) -> None:
-    """Open the lab until Ctrl+C; other commands find it with --backend real --lab.
-
-    --host, --port and --browser are those of the demo's page.
-    """
+    """Run the virtual lab until Ctrl+C."""
     if context.invoked_subcommand is not None:
         return
     from marl_airhockey.hardware.lab.lab import Lab, LabClient, served
 
     if plant == REAL:
-        raise ValueError("--plant real: the lab is what stands in for a real table")
+        raise ValueError(
+            "--plant real: the lab emulates a table; use numba, pymunk or robosuite"
+        )
     find_backend(plant)
     running = LabClient.find()
     if running is not None:
         running.close()
-        raise RuntimeError("lab: one is running already; end it first")
-    with waiting("opening the lab (longer when it is the first time)"):
+        raise RuntimeError("lab: another lab is already running; stop it first")
+    with waiting("opening the lab (the first time takes longer)"):
         opened = Lab(LabSetup(plant=plant), seed, frame_rate)
-    # Ctrl+C may come as soon as the door is open, so it is caught around all of it.
+    # Ctrl+C can come as soon as the RPC server is open, so all of it is covered.
     with contextlib.suppress(KeyboardInterrupt), opened, served(opened):
         if demo:
             show_demo(host, port, browser)
             return
         console.print(f"robot: {opened.host}, camera: stream:{opened.camera_port}")
         console.print(
-            "play in it: airhockey evaluate zoo/juggle --backend real --lab "
-            "--episodes 5\nCtrl+C ends it"
+            "to play in it: airhockey evaluate zoo/juggle --backend real --lab "
+            "--episodes 5\nCtrl+C stops the lab"
         )
         while all(opened.alive):
             time.sleep(0.5)
-        raise RuntimeError("lab: one of its processes has ended")
+        raise RuntimeError("lab: one of its processes has stopped")
 
 
 def show_demo(host: str, port: int, browser: bool) -> None:
-    """Show the learned juggler in the running lab, on a page, until interrupted."""
+    """Show the trained juggler in the running lab on a page, until interrupted."""
     require("starlette", "play")
     require("uvicorn", "play")
     from marl_airhockey.play.real_match import RealMatch
@@ -88,11 +101,14 @@ def show_demo(host: str, port: int, browser: bool) -> None:
 @lab.command()
 def fault(
     name: Annotated[
-        str | None, typer.Argument(help="Which; without one, all are listed.")
+        str | None,
+        typer.Argument(help="Name of a fault; by default all faults are listed."),
     ] = None,
-    off: Annotated[bool, typer.Option("--off", help="End it.")] = False,
+    off: Annotated[
+        bool, typer.Option("--off", help="Switch the fault off instead of on.")
+    ] = False,
 ) -> None:
-    """Let something go wrong in the running lab."""
+    """Switch a fault of the running lab on or off."""
     from marl_airhockey.hardware.lab.lab import LabClient
 
     if name is None:
@@ -101,7 +117,7 @@ def fault(
         return
     client = LabClient.find()
     if client is None:
-        raise RuntimeError("lab: none is running; start one with airhockey lab")
+        raise RuntimeError("lab: no lab is running; start one with airhockey lab")
     client.ask("fault", name=name, on=not off)
     client.close()
     console.print(f"{name}: {'ended' if off else FAULTS[name]}")

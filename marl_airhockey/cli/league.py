@@ -30,37 +30,51 @@ SCRIPTS = (
         for strength in ("weak", "fair", "strong")
     ),
 )
-"""Scripts that play if no players are given."""
+"""Names of the scripts that play if no players are given."""
 
 
 @in_environment
 def play_league(
-    scenario: Annotated[str, typer.Argument(help="A game of two sides or more.")],
+    scenario: Annotated[
+        str, typer.Argument(help="Name of a game with two or more sides.")
+    ],
     environment: SimulationOptions,
     players: Annotated[
         list[str] | None,
-        typer.Argument(help="Drivers and policies; all scripts if none are given."),
+        typer.Argument(
+            help="Names of drivers and paths of policies; by default random, and "
+            "goalkeeper, striker and allround in three strengths."
+        ),
     ] = None,
     folder: Annotated[
-        Path | None, typer.Option(help="Every policy and run in it plays, too.")
+        Path | None,
+        typer.Option(help="Folder whose policies and runs play in addition."),
     ] = None,
-    games: Annotated[int, typer.Option(help="Of each pair.", min=2)] = 100,
+    games: Annotated[
+        int, typer.Option(help="Number of games of each pair, an even number.", min=2)
+    ] = 100,
     out: Annotated[
-        Path, typer.Option(file_okay=False, help="Folder of table and picture.")
+        Path, typer.Option(file_okay=False, help="Folder of the tables and plots.")
     ] = Path("runs/league"),
     seed: Annotated[int, typer.Option(help="Seed of the first game.")] = LEAGUE_SEED,
     exploit: Annotated[
         int | None,
         typer.Option(
-            help="Train a best response to each policy for so many steps.", min=1
+            help="Number of steps for which a best response to each player is trained; "
+            "by default none is trained.",
+            min=1,
         ),
     ] = None,
     exploit_seeds: Annotated[
-        int, typer.Option(help="Best responses to each, of seeds 0 .. N - 1.", min=1)
+        int,
+        typer.Option(
+            help="Number of best responses to each player; their seeds are 0, 1, ...",
+            min=1,
+        ),
     ] = 1,
     as_json: AsJson = False,
 ) -> None:
-    """Let everybody play everybody: ratings, matrix, cycles of wins."""
+    """Let every player play against every other: ratings, results of pairs, cycles."""
     require("matplotlib", "train")
     given = players or ([] if folder else SCRIPTS)
     entries = [*given, *(find_policies(folder) if folder else [])]
@@ -99,7 +113,7 @@ def play_league(
 
 
 def label(name: str, names: list[str]) -> str:
-    """Return the last two parts of a path, or the whole one if others end likewise."""
+    """Return the last two parts of a path, or the path if these are not unique."""
     short = "/".join(Path(name).parts[-2:])
     return short if sum(n.endswith(short) for n in names) == 1 else name
 
@@ -110,14 +124,14 @@ def best_responses(
     """Train a best response to each player and return its scores, by player.
 
     Args:
-        scenario: a game of two sides or more.
-        names: of the players.
-        steps: of training.
-        seeds: best responses to each player, of seeds 0 .. seeds - 1.
-        out: folder of the runs.
+        scenario: Name of a game with two or more sides.
+        names: Names of the players.
+        steps: Number of training steps of each best response.
+        seeds: Number of best responses to each player; their seeds are 0 .. seeds - 1.
+        out: Folder of the league; runs are in its subfolder ``responses``.
 
     Returns:
-        Scores in the order of seeds.
+        Scores in the order of seeds, by player.
     """
     require("stable_baselines3", "train")
     from marl_airhockey.learn.best_response import best_response
@@ -140,7 +154,7 @@ def best_responses(
 
 
 def table(standings: Standings) -> Table:
-    """Return a table of the players, the best first."""
+    """Return a table of the players, sorted from the best to the worst."""
     names = ("player", "Elo", "95 %", "score", "Nash", "won", "drawn", "lost", "goals")
     shown = Table(*names)
     for row in standings.rows():

@@ -20,11 +20,18 @@ from marl_airhockey.sim.core.profiles import PROFILES, SUFFIX
 
 def list_scenarios(
     scenario: Annotated[
-        str | None, typer.Argument(help="Describe this scenario or profile.")
+        str | None,
+        typer.Argument(
+            help="Scenario or profile to describe; by default everything is listed."
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List all there is, or describe a scenario or a profile."""
+    """List scenarios, drivers, policies, backends and profiles, or describe one.
+
+    The description of a scenario lists its start, termination, success, seats,
+    observation, reward terms and options.
+    """
     if scenario is None:
         data = summary()
         if as_json:
@@ -58,7 +65,7 @@ def list_scenarios(
         table = Table(*data[title][0], title=title, title_justify="left")
         above = ""
         for row in data[title]:
-            # What several rows share is said once.
+            # Rows that share a meaning print it once.
             shown = {**row, "meaning": ""} if row.get("meaning") == above else row
             above = row.get("meaning", "")
             table.add_row(*(str(v) for v in shown.values()))

@@ -1,4 +1,4 @@
-"""Entry of the command line ``airhockey``; each module holds some commands."""
+"""Entry point of the command line ``airhockey``; each module defines some commands."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from marl_airhockey.cli import (
     bench,
     challenge,
     crossplay,
+    demo,
     evaluate,
+    export,
     fit,
     lab,
     league,
@@ -55,8 +57,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "league": league.play_league,
     "crossplay": crossplay.crossplay,
     "challenge": challenge.challenge,
-    "export": train.export,
-    "demo": train.demo,
+    "export": export.export,
+    "demo": demo.demo,
     "transfer": transfer.transfer,
     "fit": fit.fit,
     "fit-table": fit.fit_table,
@@ -66,7 +68,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "precompile": precompile.precompile,
     "new": new.new,
 }
-"""Functions of the commands, by name"""
+"""Function of each command, by name."""
 GROUPS = {
     "data": recordings.data,
     "study": study.study,
@@ -74,7 +76,7 @@ GROUPS = {
     "lab": lab.lab,
     "ur-emulator": ur_emulator.ur_emulator,
 }
-"""Groups of commands, by name"""
+"""Groups of commands, by name."""
 for name, function in COMMANDS.items():
     app.command(name)(function)
 for function in (delay.delay, arm.arm):
@@ -94,7 +96,7 @@ def options(
         bool,
         typer.Option(
             "--version",
-            help="Print the version.",
+            help="Print the version and exit.",
             callback=_tell_version,
             is_eager=True,
         ),
@@ -104,7 +106,10 @@ def options(
 
 
 def main() -> None:
-    """Run the command line; bad input gives one line and exit status 1."""
+    """Run the command line.
+
+    Invalid input prints one line to standard error and exits with status 1.
+    """
     try:
         app()
     except (ValueError, RuntimeError, OSError) as error:
@@ -113,7 +118,7 @@ def main() -> None:
 
 
 def _place(error: BaseException) -> str:
-    """Return the line of an author's own file that an error comes from, if any."""
+    """Return the file and line of a user's own code that raised an error, or ""."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [f for f in frames if f.filename in author_files]
     return f" ({own[-1].filename}, line {own[-1].lineno})" if own else ""

@@ -17,29 +17,35 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 
 class TemplateKind(StrEnum):
-    """Kind of file to begin with."""
+    """Kind of file to write."""
 
     SCENARIO = "scenario"
     DRIVER = "driver"
 
 
 def new(
-    kind: Annotated[TemplateKind, typer.Argument(help="What to write.")],
-    name: Annotated[str, typer.Argument(help="Name of it, like my_task.")],
+    kind: Annotated[TemplateKind, typer.Argument(help="Kind of the example.")],
+    name: Annotated[
+        str, typer.Argument(help="Name of the new scenario or driver, e.g. my_task.")
+    ],
     out: Annotated[
-        Path, typer.Option(file_okay=False, help="Folder of the file.")
+        Path, typer.Option(file_okay=False, help="Folder of the new file.")
     ] = Path(),
 ) -> None:
-    """Write a scenario or a driver to change: a commented example that runs."""
+    """Write a commented example of a scenario or a driver, which runs as it is."""
     if not name.isidentifier() or name != name.lower():
-        raise ValueError(f"{name!r}: expected a name like my_task")
+        raise ValueError(
+            f"{name!r}: expected lower-case letters, digits and _, for example my_task"
+        )
     if keyword.iskeyword(name) or find_spec(name) is not None:
-        raise ValueError(f"{name}: Python has such a word or module; take another")
+        raise ValueError(
+            f"{name}: this is a keyword or a module of Python; choose another name"
+        )
     own = scenario_names() if kind is TemplateKind.SCENARIO else driver_names()
     if name in {*own, *plugin_names(f"{kind}s")}:
-        raise ValueError(f"{name}: there is a {kind} of this name; take another")
+        raise ValueError(f"{name}: a {kind} has this name; choose another name")
     if not out.is_dir():
-        raise ValueError(f"{out}: there is no such folder")
+        raise ValueError(f"{out}: this folder does not exist")
     camel = "".join(word.capitalize() for word in name.split("_"))
     text = (TEMPLATES / f"{kind}.py").read_text()
     path = out / f"{name}.py"
@@ -47,7 +53,7 @@ def new(
         with path.open("x") as file:
             file.write(text.replace("Template", camel).replace("my_driver", name))
     except FileExistsError:
-        raise ValueError(f"{path}: there is such a file; take another name") from None
+        raise ValueError(f"{path}: this file exists; choose another name") from None
     console.print(f"wrote {path}; next:")
     if kind is TemplateKind.SCENARIO:
         console.print(f"  airhockey list {path}")

@@ -1,4 +1,4 @@
-"""Parts that commands share: the application, options, the progress bar."""
+"""Parts that commands share: options, the console, and the progress of training."""
 
 from __future__ import annotations
 
@@ -23,34 +23,49 @@ console = Console()
 Scenario = Annotated[
     str | None,
     typer.Option(
-        "--scenario", "-s", help="Scenario; by default that of the policy's training."
+        "--scenario",
+        "-s",
+        help="Name or file of a scenario; by default the scenario in which the policy "
+        "was trained.",
     ),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Backend = Annotated[str, typer.Option(help="Physics.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Backend = Annotated[
+    str,
+    typer.Option(
+        help="Physics engine: numba, pymunk or robosuite; real with --lab or --rig."
+    ),
+]
 Profile = Annotated[
     str | None,
     typer.Option(
-        help="ideal, ur5e, ur5e-authors, gantry, or a file of airhockey fit-table; by "
-        "default that of the policy's training, else ideal."
+        help="Sensing and actuation: ideal, ur5e, ur5e-authors, gantry, or a file of "
+        "airhockey fit-table; by default the profile in which the policy was trained, "
+        "else ideal."
     ),
 ]
 Options = Annotated[
     list[str] | None,
-    typer.Option("--option", help="A field of the scenario, NAME=VALUE; repeatable."),
+    typer.Option(
+        "--option",
+        help="Option of the scenario, NAME=VALUE; airhockey list SCENARIO prints all "
+        "options. Can be repeated.",
+    ),
 ]
 Physics = Annotated[
     list[str] | None,
     typer.Option(
-        help="A preset, a TOML file of airhockey fit, NAME=VALUE or NAME=LOW:HIGH; "
-        "repeatable."
+        help="Physics parameter, NAME=VALUE, or NAME=LOW:HIGH to sample it for each "
+        "episode; or a preset (professional, wooden) or a TOML file of airhockey fit. "
+        "Can be repeated."
     ),
 ]
 Workers = Annotated[
     int | None,
     typer.Option(
         "--num-workers",
-        help="Threads that step the worlds; else MARL_AIRHOCKEY_THREADS says, or 1.",
+        help="Largest number of threads that step the worlds; by default the "
+        "environment variable MARL_AIRHOCKEY_THREADS, or 1.",
         min=1,
         callback=use_threads,
     ),
@@ -65,20 +80,28 @@ def _trust(given: bool) -> bool:
 Trusting = Annotated[
     bool,
     typer.Option(
-        "--trust", help="Load policies that hold pickled Python.", callback=_trust
+        "--trust",
+        help="Load policies that contain pickled Python, which can run any code.",
+        callback=_trust,
     ),
 ]
 Drivers = Annotated[
     list[str] | None,
-    typer.Option("--driver", help="Who drives another seat, AGENT=NAME; repeatable."),
+    typer.Option(
+        "--driver",
+        help="Driver of another seat, AGENT=NAME, for example paddle_1=striker. Can be "
+        "repeated.",
+    ),
 ]
 
 
 def settings(pairs: list[str] | None) -> dict[str, Any]:
-    """Return NAME=VALUE pairs as a dict; values as in TOML, bare words as strings.
+    """Return NAME=VALUE pairs as a dict.
+
+    Values are parsed as TOML. A value that is not valid TOML is a string.
 
     Raises:
-        ValueError: A pair without "=", or a name that is given twice.
+        ValueError: A pair has no "=", or a name is given twice.
     """
     chosen: dict[str, Any] = {}
     for pair in pairs or []:
@@ -95,14 +118,14 @@ def settings(pairs: list[str] | None) -> dict[str, Any]:
 
 
 def physics_of(given: list[str] | None) -> dict[str, Any]:
-    """Return physical parameters by name from the values of ``--physics``.
+    """Return physics parameters by name from the values of ``--physics``.
 
     Args:
-        given: Names of presets, TOML files, NAME=VALUE and NAME=LOW:HIGH; the latter
-            replace what is in presets and files.
+        given: Names of presets, TOML files, NAME=VALUE and NAME=LOW:HIGH. The last two
+            override presets and files.
 
     Raises:
-        ValueError: None of these, or a name that is given twice.
+        ValueError: A text is none of these, or a name is given twice.
     """
     loaded: dict[str, Any] = {}
     found: dict[str, Any] = {}
@@ -127,7 +150,7 @@ def physics_of(given: list[str] | None) -> dict[str, Any]:
 
 
 def measure_of(row: dict[str, float]) -> str:
-    """Return the name of the measure in a row of training: "success" or "score"."""
+    """Return the name of the measure in a row of evaluations: "success" or "score"."""
     return "success" if "success" in row else "score"
 
 

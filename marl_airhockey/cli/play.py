@@ -31,13 +31,22 @@ if TYPE_CHECKING:
     from marl_airhockey.play.live_match import LiveMatch
     from marl_airhockey.play.open_table import Plant
 
-Host = Annotated[str, typer.Option(help="Address to listen at; others need the token.")]
-Port = Annotated[int, typer.Option(help="0 for a free one.", min=0, max=65535)]
-Browser = Annotated[bool, typer.Option(help="Open the page.")]
+Host = Annotated[
+    str,
+    typer.Option(
+        help="Network address of the page; 0.0.0.0 serves it on all networks, with an "
+        "access token in the printed link."
+    ),
+]
+Port = Annotated[
+    int,
+    typer.Option(help="Port of the page; 0 selects a free port.", min=0, max=65535),
+]
+Browser = Annotated[bool, typer.Option(help="Open the page in the browser.")]
 Reaction = Annotated[
     float | None,
     typer.Option(
-        help="Latency of drivers that are no people, s.",
+        help="Latency of the actions of drivers that are not people, s.",
         min=BOUNDS["reaction"][0],
         max=BOUNDS["reaction"][1],
     ),
@@ -45,7 +54,8 @@ Reaction = Annotated[
 Noise = Annotated[
     float | None,
     typer.Option(
-        help="Noise on their actions, as a fraction of top speed.",
+        help="Standard deviation of the noise on the actions of these drivers, as a "
+        "fraction of the top speed.",
         min=BOUNDS["noise"][0],
         max=BOUNDS["noise"][1],
     ),
@@ -53,7 +63,7 @@ Noise = Annotated[
 Pace = Annotated[
     float | None,
     typer.Option(
-        help="Largest of their speeds, as a fraction of top speed.",
+        help="Largest speed of these drivers, as a fraction of the top speed.",
         min=BOUNDS["pace"][0],
         max=BOUNDS["pace"][1],
     ),
@@ -66,25 +76,36 @@ def play(
     environment: EnvironmentOptions,
     opponent: Annotated[
         str | None,
-        typer.Option(help="Who sits at all other seats; of the zoo if it has one."),
+        typer.Option(
+            help="Driver of all other seats; by default a fitting policy of the zoo, "
+            "else allround."
+        ),
     ] = None,
     reaction: Reaction = None,
     noise: Noise = None,
     pace: Pace = None,
     record: Annotated[
-        Path | None, typer.Option(help="Write every episode into this folder.")
+        Path | None,
+        typer.Option(
+            help="Folder in which every episode is recorded; by default nothing is "
+            "recorded."
+        ),
     ] = None,
     keep: Annotated[
         int,
-        typer.Option(help="Most recordings; then the oldest of this table go.", min=1),
+        typer.Option(
+            help="Largest number of recordings of this table; the oldest are deleted.",
+            min=1,
+        ),
     ] = 1000,
     host: Host = "127.0.0.1",
     port: Port = 8480,
     browser: Browser = True,
 ) -> None:
-    """Play against a policy, a script or each other in the browser.
+    """Play in the browser against a policy, a script or other people.
 
-    With --driver AGENT=person people take that seat.
+    --driver AGENT=person gives a seat to a person. In games against people, drivers are
+    limited to human latency and speed, unless --reaction, --noise or --pace is given.
     """
     require("starlette", "play")
     require("uvicorn", "play")
@@ -103,21 +124,21 @@ def play(
         seat_drivers(match, opponent, seats)
         if not given and kind is LiveMatch and match.has_opponents:
             match.set_handicap(PRESETS[USUAL])
-        with waiting("preparing the table (longer when it is the first time)"):
+        with waiting("preparing the table (the first time takes longer)"):
             match.warm_up()
         if record:
-            console.print(f"recordings: {record}, of this table the newest {keep}")
+            console.print(f"recordings: {record}, at most {keep} of this table")
         host_match(match, record, host, port, browser, keep=keep)
 
 
 def _as_trained(scenario: str, names: set[str | None], given: Keywords) -> Keywords:
-    """Fill in what is not given from what the policies that play were trained in."""
+    """Complete the keywords with those in which the policies were trained."""
     from marl_airhockey.play.match_drivers import PERSON
 
     chosen = sorted(str(name) for name in names if name not in (None, PERSON))
     players = {name: make_driver(name) for name in chosen}
     _, keywords, _ = as_trained_unless_given(players, scenario, given)
-    keywords.pop("drivers", None)  # Every seat of a match gets its driver there.
+    keywords.pop("drivers", None)  # `seat_drivers` sets the driver of every seat.
     return keywords
 
 
@@ -130,16 +151,16 @@ def host_match(
     film: bool = False,
     keep: int | None = None,
 ) -> None:
-    """Serve a match until interrupted; of one in the virtual lab, with its faults.
+    """Serve a match until interrupted; in the virtual lab, with buttons for its faults.
 
     Args:
-        match: to serve.
-        record: folder for its recordings; None for none.
-        host: see `host_table`.
-        port: see `host_table`.
-        browser: see `host_table`.
-        film: whether to keep a real table's pictures beside the recordings.
-        keep: most recordings; None for all.
+        match: Match to serve.
+        record: Folder of the recordings; None to record nothing.
+        host: Network address of the page.
+        port: Port of the page; 0 for a free one.
+        browser: True to open the page.
+        film: True to record the video of a real table's camera.
+        keep: Largest number of recordings of this table; None for no limit.
     """
     from marl_airhockey.play.open_table import open_table
     from marl_airhockey.play.real_match import RealMatch
@@ -154,7 +175,7 @@ def host_match(
             plant = stack.enter_context(lab_plant(match.backend.rig.operator))
         session = open_table(match, recorder, plant)
         name = match.world.scenario.name
-        # The virtual lab is the plant that has faults.
+        # Only the virtual lab has faults that can be switched.
         guarded = plant is not None and not plant.faults
         host_table(
             lambda access: application(session, access),
@@ -167,10 +188,10 @@ def host_match(
 
 @contextlib.contextmanager
 def lab_plant(operator: str) -> Iterator[Plant]:
-    """Give the faults of the virtual lab that a rig's operator names; none elsewhere.
+    """Yield the faults of the virtual lab, or no faults for another table.
 
     Args:
-        operator: see `rig.Rig.operator`.
+        operator: Operator of the table, see `rig.Rig.operator`.
     """
     from marl_airhockey.hardware.lab.faults import FAULTS
     from marl_airhockey.hardware.lab.lab import LabClient
@@ -191,13 +212,13 @@ def lab_plant(operator: str) -> Iterator[Plant]:
 
 
 def seat_drivers(match: LiveMatch, opponent: str | None, seats: dict[str, Any]) -> None:
-    """Give each seat to its driver: a person at the first, opponents elsewhere.
+    """Set the driver of each seat: a person for the first, an opponent for the others.
 
     Args:
-        match: before its start.
-        opponent: of all seats that are not chosen; None for a policy of the zoo that
-            fits, or else allround.
-        seats: chosen drivers, by agent.
+        match: Match that has not started.
+        opponent: Driver of all other seats that are not in ``seats``; None for a
+            fitting policy of the zoo, or else allround.
+        seats: Chosen drivers, by agent.
     """
     from marl_airhockey.play.match_drivers import PERSON
 
@@ -208,7 +229,7 @@ def seat_drivers(match: LiveMatch, opponent: str | None, seats: dict[str, Any]) 
         match.set_driver(i, chosen.pop(agent, PERSON if i == 0 else rest))
     if chosen:
         scenario = match.world.scenario.name
-        raise ValueError(f"--driver: {scenario} has no {', '.join(chosen)}")
+        raise ValueError(f"--driver: {scenario} has no agent {', '.join(chosen)}")
 
 
 def show(recording: Path, host: str, port: int, browser: bool) -> None:
@@ -232,12 +253,12 @@ def host_table(
     """Serve an application until interrupted, after printing its address.
 
     Args:
-        make: builds the application.
-        what: is served, for the printed line.
-        host: address to listen at.
-        port: to listen at; 0 for a free one.
+        make: Function that builds the application.
+        what: Name of the application, for the printed line.
+        host: Network address of the page.
+        port: Port of the page; 0 for a free one.
         browser: True to open the page.
-        guarded: See `AccessCheck`.
+        guarded: True if local pages need the token, too; see `AccessCheck`.
     """
     from marl_airhockey.play.access import AccessCheck
     from marl_airhockey.play.connections import listen, serve
@@ -248,20 +269,20 @@ def host_table(
     address = f"http://{_reachable(host)}:{server.getsockname()[1]}/"
     if access.token:
         address += f"?token={access.token}"
-    console.print(f"{what} is at {address} (Ctrl-C ends it)", soft_wrap=True)
+    console.print(f"{what} is at {address} (Ctrl-C stops it)", soft_wrap=True)
     if browser:
         threading.Timer(0.5, webbrowser.open, [address]).start()
     serve(app, server)
 
 
 def _reachable(host: str) -> str:
-    """Return a host as pages on other machines can open it."""
+    """Return the host as a part of an address that other machines can open."""
     if host == "0.0.0.0":
         with (
             contextlib.suppress(OSError),
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe,
         ):
-            # Sends nothing: it only selects which of our addresses would be used.
+            # This sends nothing. It only selects the local address of the route.
             probe.connect(("192.0.2.1", 9))
             return str(probe.getsockname()[0])
     return f"[{host}]" if ":" in host else host

@@ -34,38 +34,47 @@ from marl_airhockey.sim.world.keywords import Keywords
 
 def precompile(
     scenarios: Annotated[
-        list[str] | None, typer.Argument(help="Scenarios; all if none are given.")
+        list[str] | None,
+        typer.Argument(help="Names of scenarios; by default all scenarios."),
     ] = None,
     backend: Backend = DEFAULT_BACKEND,
     profile: Annotated[
         list[str] | None,
-        typer.Option(help="ideal (the default), ur5e or gantry; may be repeated."),
+        typer.Option(
+            help="Sensing and actuation: ideal (the default), ur5e, ur5e-authors, "
+            "gantry, or a file of airhockey fit-table. Can be repeated."
+        ),
     ] = None,
     target: Annotated[
         str | None,
         typer.Option(
-            help=f"Level of processors to compile for: {', '.join(shipped.LEVELS)}. "
-            "The processor of this machine if it is not given."
+            help="Processor level to compile for, which needs --out: "
+            f"{', '.join(shipped.LEVELS)}. By default code is compiled for the "
+            "processor of this machine."
         ),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(file_okay=False, help="Folder for the code of a target."),
+        typer.Option(
+            file_okay=False, help="New folder for the machine code of --target."
+        ),
     ] = None,
     jobs: Annotated[
         int, typer.Option(help="Number of processes that compile.", min=1)
     ] = os.cpu_count() or 1,
 ) -> None:
-    """Compile scenarios now, so that no first start has to compile them later."""
+    """Compile scenarios in advance, so that their first reset does not have to."""
     if target is not None and target not in shipped.LEVELS:
         raise ValueError(unknown_name("target", target, list(shipped.LEVELS)))
     if (target is None) != (out is None):
-        raise ValueError("--target and --out: give both, or none for this machine")
+        raise ValueError(
+            "--target and --out need each other; give both, or none for this machine"
+        )
     if out is not None and out.exists() and not (out / shipped.MANIFEST).exists():
-        raise ValueError(f"--out: {out} is there already; name a new folder")
+        raise ValueError(f"--out {out}: this folder exists; give a new folder")
     names = scenarios or scenario_names()
     seats = {name: len(find_scenario(name).scene.seats) for name in names}
-    # Those with many seats take longest and begin first.
+    # Scenarios with many seats take the longest time, so they are started first.
     names = sorted(seats, key=lambda name: -seats[name])
     profiles = profile or ["ideal"]
     work = [(n, Keywords(backend=backend, profile=p)) for n in names for p in profiles]
@@ -86,7 +95,7 @@ def precompile(
 
 
 def _drivers() -> Iterator[tuple[str, Keywords]]:
-    """Yield what drivers and policies of ours play, with the drivers."""
+    """Yield a scenario with its keywords for each driver and policy of the library."""
     for name in independent_driver_names():
         if driver_class(name).needs_goal:
             yield "reach", Keywords(drivers={"paddle_0": name})
@@ -100,7 +109,7 @@ def _drivers() -> Iterator[tuple[str, Keywords]]:
 
 @contextmanager
 def _variables(values: dict[str, str]) -> Iterator[None]:
-    """Set variables of the environment of the processes that are started."""
+    """Set environment variables for processes that are started in this context."""
     before = dict(os.environ)
     os.environ.update(values)
     try:
@@ -111,7 +120,7 @@ def _variables(values: dict[str, str]) -> Iterator[None]:
 
 
 def _compile_all(work: list[tuple[str, Keywords]], jobs: int) -> set[Path]:
-    """Compile worlds in processes; return the files of their code."""
+    """Compile worlds in parallel processes and return the files of machine code."""
     paths: set[Path] = set()
     with (
         bar() as progress,

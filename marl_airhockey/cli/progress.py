@@ -1,4 +1,4 @@
-"""Progress of what takes long: a bar in a terminal, else a line every ten seconds."""
+"""Progress of long operations: a bar in a terminal, else a line every ten seconds."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from rich.progress import (
 from marl_airhockey.sim.jit.notices import repeated
 
 errors = Console(stderr=True)
-"""Console of messages that are no results, so that output can be piped"""
+"""Console of messages that are not results; output can still be piped."""
 
 
 @dataclass
 class Lines:
-    """Progress of one task as lines of text, with the same calls as a bar of rich's."""
+    """Progress of one task as lines of text, with the methods of ``rich.Progress``."""
 
     description: str = ""
     total: float | None = None
@@ -35,7 +35,7 @@ class Lines:
     began: float = 0.0
 
     def add_task(self, description: str, total: float | None, note: str = "") -> TaskID:
-        """Begin."""
+        """Start the task and its clock."""
         self.description, self.total, self.note = description, total, note
         self.began = time.monotonic()
         return TaskID(0)
@@ -49,19 +49,19 @@ class Lines:
         note: str | None = None,
         advance: float = 0.0,
     ) -> None:
-        """Keep what is given."""
+        """Update the values that are given."""
         self.completed = self.completed if completed is None else completed
         self.completed += advance
         self.total = self.total if total is None else total
         self.note = self.note if note is None else note
 
     def advance(self, task: TaskID, advance: float = 1.0) -> None:
-        """Add to what is done."""
+        """Add to the completed amount."""
         self.completed += advance
 
     @property
     def line(self) -> str:
-        """What is done, with the time so far and the time that is left."""
+        """Line with the elapsed time, the completed share and the time left."""
         spent = time.monotonic() - self.began
         parts = [f"{self.description}: {spent:.0f} s so far"]
         if self.total and self.completed:
@@ -72,7 +72,7 @@ class Lines:
 
 @contextmanager
 def bar() -> Iterator[Progress | Lines]:
-    """Show progress on standard error: a bar, or lines where there is no terminal."""
+    """Show progress on standard error: a bar, or lines if it is not a terminal."""
     if errors.is_terminal:
         with Progress(
             TextColumn("{task.description}"),
@@ -93,7 +93,7 @@ def bar() -> Iterator[Progress | Lines]:
 
 @contextmanager
 def waiting(what: str) -> Iterator[None]:
-    """Show that something without a measure of progress takes long."""
+    """Show a message during a long operation whose progress is unknown."""
     if errors.is_terminal:
         with errors.status(what):
             yield
@@ -104,6 +104,6 @@ def waiting(what: str) -> Iterator[None]:
 
 
 def _print(lines: Lines) -> None:
-    """Print the line of a task that has begun."""
+    """Print the line of a task, if it has started."""
     if lines.description:
         errors.print(lines.line, markup=False, highlight=False, soft_wrap=True)

@@ -14,16 +14,18 @@ from marl_airhockey.cli.progress import waiting
 from marl_airhockey.sim.core.errors import require
 
 study = typer.Typer(
-    help="Studies: participants play opponents in a planned order.",
+    help="Run studies in which participants play opponents in a planned order.",
     no_args_is_help=True,
 )
-File = Annotated[Path, typer.Argument(help="A plan, TOML.")]
-Folder = Annotated[Path, typer.Option("--out", help="What is recorded goes here.")]
+File = Annotated[Path, typer.Argument(help="Plan of the study, a TOML file.")]
+Folder = Annotated[
+    Path, typer.Option("--out", help="Folder of the recordings and event logs.")
+]
 
 
 @study.command()
 def new(file: File) -> None:
-    """Write an example of a plan, to be changed."""
+    """Write an example of a plan, which you can change."""
     from marl_airhockey.play.study.plan import EXAMPLE
 
     try:
@@ -39,7 +41,9 @@ def new(file: File) -> None:
 @study.command()
 def orders(
     file: File,
-    participants: Annotated[int, typer.Option(help="How many.", min=1)] = 12,
+    participants: Annotated[
+        int, typer.Option(help="Number of participants.", min=1)
+    ] = 12,
 ) -> None:
     """Print the order in which participants play the opponents of a plan."""
     require("starlette", "play")
@@ -65,7 +69,7 @@ def run(
     port: Port = 8480,
     browser: Browser = True,
 ) -> None:
-    """Serve a study in the browser, one participant after the other."""
+    """Serve the page of a study, for one participant after the other."""
     require("starlette", "play")
     require("uvicorn", "play")
     from marl_airhockey.play.server import application
@@ -75,7 +79,7 @@ def run(
 
     plan = load_plan(file)
     claim_folder(out, file)
-    with waiting("preparing the table (longer when it is the first time)"):
+    with waiting("preparing the table (the first time takes longer)"):
         session = open_study(plan, out)
     host_table(
         lambda access: application(session, access), plan.title, host, port, browser
@@ -86,9 +90,9 @@ def run(
 
 @study.command("list")
 def list_participants(
-    folder: Annotated[Path, typer.Argument(help="Of the study.")],
+    folder: Annotated[Path, typer.Argument(help="Folder of the study.")],
 ) -> None:
-    """List participants: number, code, games, answered blocks, how they ended."""
+    """List the participants with number, code, games, answered blocks and state."""
     from marl_airhockey.play.study.archive import diaries
 
     table = Table("number", "code", "began", "games", "blocks answered", "state")
@@ -112,11 +116,15 @@ def list_participants(
 
 @study.command()
 def erase(
-    folder: Annotated[Path, typer.Argument(help="Of the study.")],
-    code: Annotated[str, typer.Argument(help="That the participant was shown.")],
+    folder: Annotated[Path, typer.Argument(help="Folder of the study.")],
+    code: Annotated[
+        str, typer.Argument(help="Code of the participant, which the page showed.")
+    ],
 ) -> None:
-    """Erase all that is kept of a participant."""
+    """Erase all data of a participant."""
     from marl_airhockey.play.study.archive import erase as delete
 
     console.print(f"erased {delete(folder, code)} files of {code}")
-    console.print("reports elsewhere may still name them: make them again")
+    console.print(
+        "reports in other folders may still contain this participant; write them again"
+    )

@@ -23,29 +23,40 @@ def teleop(
     environment: TableOptions,
     by: Annotated[
         Literal["mouse", "shadow"],
-        typer.Option(help="The page's pointer, or a hand under a camera of its own."),
+        typer.Option(
+            help="Input device: mouse (the pointer on the page), or shadow (a hand "
+            "under its own camera)."
+        ),
     ] = "mouse",
     hand: Annotated[
         Path | None,
-        typer.Option(help="Of --by shadow: file of that camera, calibrate --hand."),
+        typer.Option(
+            help="File of the hand's camera from airhockey calibrate --hand, for --by "
+            "shadow."
+        ),
     ] = None,
     out: Annotated[
         Path, typer.Option(file_okay=False, help="Folder of the recordings.")
     ] = Path("recordings"),
     film: Annotated[
-        bool, typer.Option(help="Keep the camera's pictures beside them.")
+        bool, typer.Option(help="Record the video of the table's camera.")
     ] = True,
     opponent: Annotated[
-        str | None, typer.Option(help="Who sits at all other seats.")
+        str | None,
+        typer.Option(
+            help="Driver of all other seats; by default a fitting policy of the zoo, "
+            "else allround."
+        ),
     ] = None,
     host: cli_play.Host = "127.0.0.1",
     port: cli_play.Port = 8480,
     browser: cli_play.Browser = True,
 ) -> None:
-    """Lead the paddle yourself, on a real table by its live video, and record it.
+    """Teleoperate the paddle of a real or simulated table, and record it.
 
-    On a real table the hand of --by shadow leads the arm; at a simulated seat it is the
-    paddle. --lab takes the virtual lab's devices.
+    The page shows the live video of a real table. With --by shadow, the arm of a real
+    table follows the hand. On a simulated table the hand itself is the paddle. --lab
+    uses the devices of the virtual lab.
     """
     require("starlette", "play")
     require("uvicorn", "play")
@@ -55,9 +66,9 @@ def teleop(
 
     real = environment.backend == REAL
     if by == "mouse" and hand is not None:
-        raise ValueError("--hand: add --by shadow")
+        raise ValueError("--hand needs --by shadow")
     own = environment
-    if not real:  # Of a simulated table the lab has the hand alone.
+    if not real:  # With a simulated table, the lab provides only the hand.
         own = replace(environment, lab=False)
     with (
         own.table(own.keywords) as table,
@@ -68,32 +79,32 @@ def teleop(
             f"shadow:rig={path},prescribe={str(not real).lower()}" if path else PERSON
         )
         cli_play.seat_drivers(match, opponent, {"paddle_0": leader})
-        with waiting("preparing the table (longer when it is the first time)"):
+        with waiting("preparing the table (the first time takes longer)"):
             match.warm_up()
         cli_play.host_match(match, out, host, port, browser, film)
 
 
 @contextmanager
 def hand_file(wanted: bool, hand: Path | None, lab: bool) -> Iterator[Path | None]:
-    """Give the file of the rig of a hand, while its lab runs; None if none is wanted.
+    """Yield the rig file of a hand's camera, while the lab runs; None without a hand.
 
     Args:
-        wanted: whether a hand leads.
-        hand: its file.
-        lab: whether it is the virtual lab's.
+        wanted: True if a hand moves the paddle.
+        hand: Rig file of the hand's camera, if it was given.
+        lab: True for the hand of the virtual lab.
 
     Raises:
-        ValueError: neither a file nor a lab.
-        RuntimeError: the lab does not start.
+        ValueError: Neither a file nor the lab was given.
+        RuntimeError: The lab does not start.
     """
     if not wanted or hand is not None:
         yield hand if wanted else None
         return
     if not lab:
-        raise ValueError("--by shadow: which camera? --hand FILE, or --lab")
+        raise ValueError("--by shadow needs a camera; add --hand FILE or --lab")
     from marl_airhockey.hardware.calibration.lab_rig import hand_rig
 
-    with waiting("opening the lab (longer when it is the first time)"):
+    with waiting("opening the lab (the first time takes longer)"):
         opened = hand_rig()
         path = opened.__enter__()
     try:

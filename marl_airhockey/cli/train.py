@@ -1,4 +1,4 @@
-"""Commands ``airhockey train | export | demo``."""
+"""Command ``airhockey train``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from marl_airhockey.cli.evaluate import result_table
 from marl_airhockey.cli.options import (
     AsJson,
     Backend,
@@ -23,9 +22,7 @@ from marl_airhockey.cli.options import (
     settings,
     train_with_progress,
 )
-from marl_airhockey.cli.progress import bar
 from marl_airhockey.registry import DEFAULT_BACKEND
-from marl_airhockey.sim.core.errors import require
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.algorithms import AnyConfig
@@ -33,53 +30,100 @@ if TYPE_CHECKING:
 
 
 def train(
-    scenario: Annotated[str, typer.Argument(help="Name of a scenario.")] = "",
-    seed: Annotated[int, typer.Option(help="Seed of worlds and network.")] = 0,
+    scenario: Annotated[
+        str, typer.Argument(help="Name or file of a scenario; not needed with --data.")
+    ] = "",
+    seed: Annotated[
+        int, typer.Option(help="Seed of the worlds and of the initial network.")
+    ] = 0,
     backend: Backend = DEFAULT_BACKEND,
     profile: Annotated[
-        str | None, typer.Option(help="What robots sense: ideal, ur5e, gantry.")
+        str | None,
+        typer.Option(
+            help="Sensing and actuation: ideal, ur5e, ur5e-authors, gantry, or a file "
+            "of airhockey fit-table; by default ideal."
+        ),
     ] = None,
     steps: Annotated[
-        int | None, typer.Option(help="Steps of single worlds; of the gradient.")
+        int | None,
+        typer.Option(
+            help="Number of steps, summed over all worlds; with --data, number of "
+            "gradient steps. By default as in the preset."
+        ),
     ] = None,
     hidden: Annotated[
-        int | None, typer.Option(help="Units of both layers; the paper's size is 256.")
+        int | None,
+        typer.Option(
+            help="Number of units of each of the two hidden layers; the paper has 256. "
+            "By default as in the preset."
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder of the run.")
+        Path | None,
+        typer.Option(
+            file_okay=False,
+            help="Folder of the run; by default runs/SCENARIO-SEED, and "
+            "runs/SCENARIO-ALGO-SEED for algorithms other than ppo.",
+        ),
     ] = None,
     engine: Annotated[
-        str | None, typer.Option(help="torch (usual), sb3, or rllib over many.")
+        str | None,
+        typer.Option(
+            help="Implementation of PPO: torch (the usual one), sb3 "
+            "(stable-baselines3), or rllib (several processes)."
+        ),
     ] = None,
     num_env_runners: Annotated[
-        int | None, typer.Option(help="Of rllib: processes that step the worlds.")
+        int | None,
+        typer.Option(
+            help="Number of processes that step the worlds, for --engine rllib; 0 for "
+            "the process of the learner."
+        ),
     ] = None,
     init: Annotated[
-        Path | None, typer.Option(help="Begin with the weights of this run.")
+        Path | None,
+        typer.Option(
+            help="Folder of a run whose weights are the initial weights; it must have "
+            "the same engine and network size."
+        ),
     ] = None,
     algo: Annotated[
         str,
         typer.Option(
-            help="ppo; sac_her; bc, iql, td3_bc and rebrac learn from --data."
+            help="Algorithm: ppo or sac_her; or, to learn from --data, bc, iql, td3_bc "
+            "or rebrac."
         ),
     ] = "ppo",
     data: Annotated[
         list[Path] | None,
-        typer.Option(help="Recordings to learn from, or a folder of them; repeatable."),
+        typer.Option(
+            help="Recording, folder of recordings, or name of a dataset to learn from. "
+            "Can be repeated."
+        ),
     ] = None,
     change: Annotated[
         list[str] | None,
-        typer.Option("--set", help="A setting of the preset, NAME=VALUE; repeatable."),
+        typer.Option(
+            "--set", help="Setting of the preset, NAME=VALUE. Can be repeated."
+        ),
     ] = None,
     option: Options = None,
     other: Drivers = None,
     physics: Physics = None,
-    resume: Annotated[Path | None, typer.Option(help="Resume this run.")] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of an interrupted run to resume, with its own settings."
+        ),
+    ] = None,
     num_workers: Workers = None,
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
-    """Train a policy with PPO and its preset, or by another --algo; or --resume."""
+    """Train a policy, or resume an interrupted run.
+
+    The default is PPO with the preset of the scenario.
+    """
     from marl_airhockey.learn.algorithms import make_config
     from marl_airhockey.learn.offline.choice import learned_from
     from marl_airhockey.learn.offline.config import OfflineConfig
@@ -97,7 +141,10 @@ def train(
     given = {name: value for name, value in given.items() if value is not None}
     if resume is not None:
         if given or any((scenario, change, option, other, out, data, profile)):
-            raise ValueError("--resume goes on as the run was begun: give nothing else")
+            raise ValueError(
+                "--resume continues a run with its own settings; remove all other "
+                "settings"
+            )
         _train(None, resume, as_json)
         return
     shared = {
@@ -117,7 +164,7 @@ def train(
 
 
 def _tell_updates(steps: int, config: PPOConfig, changes: dict[str, Any]) -> None:
-    """Print how many updates a number of steps is, and what is usual."""
+    """Print a number of steps as updates, and the number of steps of the preset."""
     from marl_airhockey.learn.ppo_config import preset
 
     others = {name: value for name, value in changes.items() if name != "total_steps"}
@@ -130,7 +177,7 @@ def _tell_updates(steps: int, config: PPOConfig, changes: dict[str, Any]) -> Non
 
 
 def _train(config: AnyConfig | None, folder: Path, as_json: bool) -> None:
-    """Train, or resume a run for None, and print the result."""
+    """Train, or resume the run in the folder without a config; print the result."""
     finished = config is None and _is_finished(folder)
     row = train_with_progress(config, folder)
     measure = measure_of(row)
@@ -153,11 +200,11 @@ def _train(config: AnyConfig | None, folder: Path, as_json: bool) -> None:
 
 
 def _finished(folder: Path) -> str:
-    """Return that a run was finished already, and how to train on."""
+    """Return a text: the run is complete, and how to continue its training."""
     from marl_airhockey.learn.algorithms import load_any_config
     from marl_airhockey.learn.ppo_config import PPOConfig
 
-    words = f"{folder}: this run was finished already; to train on, begin another one"
+    words = f"{folder}: this run is complete; to train further, start another run"
     config = load_any_config(folder)
     if not isinstance(config, PPOConfig):
         return f"{words} with more --steps"
@@ -165,7 +212,7 @@ def _finished(folder: Path) -> str:
 
 
 def _next(folder: Path) -> str:
-    """Return the command that measures a run: a league for a game of several teams."""
+    """Return the command that evaluates a run: a league for a game of several teams."""
     from marl_airhockey.learn.algorithms import load_any_config
     from marl_airhockey.learn.ppo_config import PPOConfig
 
@@ -176,69 +223,9 @@ def _next(folder: Path) -> str:
 
 
 def _is_finished(folder: Path) -> bool:
-    """Return True for the folder of a run that has made all of its steps."""
+    """Return True if the run in a folder has completed all of its steps."""
     from marl_airhockey.learn.algorithms import load_any_config
     from marl_airhockey.learn.run import Progress
 
     state, config = folder / "state.json", load_any_config(folder)
     return state.exists() and Progress.load(state).steps >= config.total_steps
-
-
-def export(
-    run: Annotated[
-        Path, typer.Argument(file_okay=False, help="Folder of a training run.")
-    ],
-    out: Annotated[Path, typer.Option(help="The file to write.")] = Path("policy.npz"),
-    checkpoint: Annotated[
-        Path | None, typer.Option(help="One of the run's instead of its last policy.")
-    ] = None,
-    trust: Trusting = False,
-) -> None:
-    """Freeze a trained policy into one small file, .npz or .onnx, with a card."""
-    if not (run / "config.toml").exists():
-        raise ValueError(f"{run}: there is no training run; name the folder of one")
-    require("torch", "train")
-    from marl_airhockey.learn.export import export_policy
-
-    console.print_json(json.dumps(dict(export_policy(run, out, checkpoint).card)))
-    which = checkpoint or f"the last policy of {run}"
-    console.print(
-        f"{out}: {which}, {out.stat().st_size / 1000:.0f} kB; airhockey evaluate {run} "
-        f"plays the best one, which --checkpoint {run / 'best.npz'} exports",
-        soft_wrap=True,
-    )
-
-
-def demo(
-    out: Annotated[
-        Path, typer.Option(file_okay=False, help="Folder for what it makes.")
-    ] = Path("runs/demo"),
-    scenario: Annotated[str, typer.Option(help="What to learn.")] = "juggle",
-    steps: Annotated[
-        int | None,
-        typer.Option(help="Steps of single worlds; the preset's, at most 2 M."),
-    ] = None,
-) -> None:
-    """Train a paddle to juggle, measure it, and show what it learned."""
-    require("torch", "train")
-    from marl_airhockey.learn.demo import run_demo
-
-    with bar() as progress:
-        task = progress.add_task(f"learning to {scenario}", total=None, note="")
-
-        def report(done: int, total: int, row: dict[str, float]) -> None:
-            """Show the progress of training."""
-            name = measure_of(row)
-            note = f"{name} {row[name]:.2f}" if row else ""
-            progress.update(task, completed=done, total=total, note=note)
-
-        results, files = run_demo(scenario, out, steps, report)
-    console.print(result_table(results))
-    for what, path in files.items():
-        console.print(f"{what:>16}: {path}", soft_wrap=True)
-    console.print(
-        "\ntry next:\n"
-        f"  airhockey watch {out / 'run'} --scenario {scenario}\n"
-        "  airhockey train hit_goal && airhockey evaluate runs/hit_goal-0 -s hit_goal\n"
-        "  airhockey list"
-    )

@@ -35,35 +35,58 @@ def transfer(
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            help="A policy or run; repeatable. None: two are trained in --out, one "
-            "in each profile, unless they are there."
+            help="Path of a policy or run. Can be repeated. By default one policy is "
+            "trained in each profile; its run is in --out, and a complete one is used "
+            "again."
         ),
     ] = None,
     to: Annotated[
-        str, typer.Option(help="Backends, comma-separated.")
+        str,
+        typer.Option(
+            help="Backends, separated by commas: numba, pymunk and robosuite."
+        ),
     ] = "numba,pymunk,robosuite",
     profile: Annotated[
-        str, typer.Option(help="Profiles, comma-separated.")
+        str,
+        typer.Option(
+            help="Profiles, separated by commas: ideal, ur5e, ur5e-authors, gantry, or "
+            "files of airhockey fit-table."
+        ),
     ] = "ideal,ur5e",
-    episodes: Annotated[int, typer.Option(help="Of each.", min=1)] = 200,
+    episodes: Annotated[
+        int,
+        typer.Option(
+            help="Number of episodes of each policy, backend and profile.", min=1
+        ),
+    ] = 200,
     fine_tune: Annotated[
         int,
-        typer.Option(help="Steps by which runs are trained on, on robosuite.", min=0),
+        typer.Option(
+            help="Number of steps for which runs are trained further on robosuite.",
+            min=0,
+        ),
     ] = 0,
-    seed: Annotated[int, typer.Option(help="Of training.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the training.")] = 0,
     out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder of runs and results.")
+        Path | None,
+        typer.Option(
+            file_okay=False,
+            help="Folder of runs and results; by default runs/transfer-SCENARIO.",
+        ),
     ] = None,
     option: Options = None,
     num_workers: Workers = None,
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
-    """Measure policies from the 2D table elsewhere: success with 95 % intervals."""
+    """Measure the success of policies on several backends and in several profiles.
+
+    The results have 95 % intervals.
+    """
     from marl_airhockey.system_id.measure import measure_transfer, plot_transfer
 
     folder = out or Path("runs") / f"transfer-{scenario}"
-    # Everything that may be wrong is checked before anything takes time.
+    # All inputs are checked before any long computation starts.
     backends, profiles = _list(to), _list(profile)
     _check_names(backends, profiles)
     find_scenario(scenario, **settings(option))
@@ -100,15 +123,15 @@ def _policies(
     seed: int,
     folder: Path,
 ) -> dict[str, Driver]:
-    """Return the policies to measure, by name, after all training that they need.
+    """Return the policies to measure by name; train them first if necessary.
 
     Args:
-        scenario: what they play.
-        names: of policies or runs; if empty, one is trained in each profile.
-        profiles: names of profiles.
-        fine_tune: steps by which each run is trained on; 0 for none.
-        seed: of training.
-        folder: of the runs.
+        scenario: Name of the scenario.
+        names: Names of policies or runs; if empty, one is trained in each profile.
+        profiles: Names of the profiles.
+        fine_tune: Number of steps for which each run is trained further; 0 for none.
+        seed: Seed of the training.
+        folder: Folder of the runs.
     """
     from marl_airhockey.system_id.measure import fine_tuning_config, pretraining_config
 
@@ -121,7 +144,9 @@ def _policies(
     if fine_tune:
         runs = [n for n in names if (Path(n) / "config.toml").exists()]
         if not runs:
-            raise ValueError(f"--fine-tune: of {names}, none is the folder of a run")
+            raise ValueError(
+                f"--fine-tune: none of {names} is a folder of a run; it needs one"
+            )
         for name in runs:
             run = folder / f"{Path(name).name}-tuned-{fine_tune}"
             names.append(_run(run, fine_tuning_config(Path(name), fine_tune)))
@@ -133,7 +158,7 @@ def _policies(
 
 
 def _table(rows: list[EvaluationResult], title: str) -> Table:
-    """Return a table with a row for each policy and backend, a column for a profile."""
+    """Return a table: a row for each policy and backend, a column for each profile."""
     table = Table("policy", "in", title=title)
     for kind in dict.fromkeys(row.profile for row in rows):
         table.add_column(f"{kind} profile (95 %)", justify="right")
@@ -151,7 +176,7 @@ def _table(rows: list[EvaluationResult], title: str) -> Table:
 
 
 def _check_names(backends: list[str], profiles: list[str]) -> None:
-    """Raise an error that names an unknown backend or profile."""
+    """Raise an error if a backend or a profile does not exist."""
     for backend in backends:
         find_backend(backend)
     for profile in profiles:
@@ -159,15 +184,16 @@ def _check_names(backends: list[str], profiles: list[str]) -> None:
 
 
 def _list(names: str) -> list[str]:
-    """Return the names in a list with commas, each once."""
+    """Return the different names in a text with commas."""
     return list(dict.fromkeys(name.strip() for name in names.split(",")))
 
 
 def _run(folder: Path, config: PPOConfig) -> str:
-    """Train a run, or resume it if it is there; return its folder.
+    """Train a run, or resume it if it exists; return its folder.
 
     Raises:
-        ValueError: a run with other settings, or a cut off one that is not trusted.
+        ValueError: The folder contains a run with other settings, or an interrupted run
+            that is not trusted.
     """
     from marl_airhockey.learn.ppo_config import PPOConfig
     from marl_airhockey.learn.run import TrainingRun
@@ -177,7 +203,9 @@ def _run(folder: Path, config: PPOConfig) -> str:
     if begun:
         run = TrainingRun(load_config(PPOConfig, folder / "config.toml"), folder)
         if run.config != config:
-            raise ValueError(f"{folder} holds another run: say another --out")
+            raise ValueError(
+                f"{folder} contains a run with other settings; give another --out"
+            )
         if run.steps_left > 0 and (folder / "last.zip").exists():
             require_trust(folder / "last.zip")
     train_with_progress(None if begun else config, folder)

@@ -36,31 +36,41 @@ def trials(
         list[str],
         typer.Argument(
             metavar="[METHOD=]POLICY...",
-            help="Drivers and policies, or recordings of their play; several of a "
-            "METHOD (its seeds) are one.",
+            help="Names of drivers, paths of policies, or folders of recordings. "
+            "Policies with the same METHOD are seeds of one method.",
         ),
     ],
     environment: EnvironmentOptions,
     scenario: ScenarioOption = None,
     out: Annotated[
         Path,
-        typer.Option(file_okay=False, help="Folder of the sheet; one there goes on."),
+        typer.Option(
+            file_okay=False,
+            help="Folder of the trial table; an interrupted one is resumed.",
+        ),
     ] = Path("trials"),
     number: Annotated[
-        int, typer.Option("--trials", help="Of each method.", min=1)
+        int, typer.Option("--trials", help="Number of trials of each method.", min=1)
     ] = 50,
     starts: Annotated[
-        int, typer.Option(help="Fixed starts, which all methods play.", min=1)
+        int,
+        typer.Option(
+            help="Number of fixed start states, which all methods play.", min=1
+        ),
     ] = 25,
     operator: Annotated[
-        str, typer.Option(help="Who puts the puck on the table, for the sheet.")
+        str,
+        typer.Option(
+            help="Name of the person who places the puck, for the trial table."
+        ),
     ] = "",
     seed: Annotated[int, typer.Option(help="Seed of the order of trials.")] = 0,
     as_json: AsJson = False,
 ) -> None:
-    """Compare policies on a table: same starts, in turns, the operator blinded.
+    """Compare policies on a table in blinded trials from the same start states.
 
-    Recordings are compared as they were played, without new trials.
+    The methods alternate in random order, and the operator does not see which of them
+    plays. Recordings are compared without new trials.
     """
     from marl_airhockey.evaluation.trial_sheet import plan_trials
 
@@ -100,24 +110,24 @@ def trials(
         console.print_json(json.dumps(result))
         return
     _show(found, f"{game} on {backend}")
-    console.print(f"{sheet.trials_an_hour:.0f} trials an hour; files: {out}")
+    console.print(f"{sheet.trials_an_hour:.0f} trials per hour; files: {out}")
 
 
 def _recordings(methods: dict[str, list[str]]) -> dict[str, list[Path]]:
-    """Return the recordings of methods; none if these are drivers and policies.
+    """Return the recordings by method; an empty dict for drivers and policies.
 
     Raises:
-        ValueError: Some are recordings and some are not.
+        ValueError: Only some of them are recordings.
     """
     found = {name: [Path(path) for path in paths] for name, paths in methods.items()}
     are = [is_recording(path) for paths in found.values() for path in paths]
     if any(are) and not all(are):
-        raise ValueError("trials: name recordings or policies, not both")
+        raise ValueError("trials: give either recordings or policies, not both")
     return found if all(are) else {}
 
 
 def _compare_recordings(methods: dict[str, list[Path]], as_json: bool) -> None:
-    """Compare methods by recordings of their play, each of one policy."""
+    """Compare methods by recordings; each recording is of one policy."""
     from marl_airhockey.data.files import shared_head
     from marl_airhockey.evaluation.comparison import compare
     from marl_airhockey.evaluation.evaluate import recorded_outcomes
@@ -138,7 +148,7 @@ def _play(
     plan: Callable[[list[int]], TrialPlan],
     out: Path,
 ) -> TrialSheet:
-    """Play the trials of a plan from starts that are spread; return the sheet."""
+    """Play the trials of a plan from spread start states; return the trial table."""
     from marl_airhockey.build import build_driven_world
     from marl_airhockey.evaluation.trial_sheet import TrialSheet
     from marl_airhockey.evaluation.trials import (
@@ -166,29 +176,29 @@ def _play(
 
 
 def _on_table(text: str, environment: EnvironmentOptions) -> str:
-    """Return METHOD=POLICY with the policy that is for the table."""
+    """Return METHOD=POLICY with the policy that was trained for the table."""
     method, equals, policy = text.rpartition("=")
     return method + equals + environment.on_table(policy)
 
 
 def _methods(texts: list[str]) -> dict[str, list[str]]:
-    """Return policies by the names of their methods.
+    """Return the policies of each method, by name.
 
     Raises:
-        ValueError: a policy that is there twice.
+        ValueError: A policy is given twice.
     """
     found: dict[str, list[str]] = {}
     for text in texts:
         method, _, policy = text.rpartition("=")
         method = method or policy
         if policy in found.setdefault(method, []):
-            raise ValueError(f"{text}: it is there twice")
+            raise ValueError(f"{text}: this policy is given twice")
         found[method].append(policy)
     return found
 
 
 def _show(found: Comparison, title: str) -> None:
-    """Print methods, and the differences between them."""
+    """Print a table of the methods and of the differences between them."""
     table = Table("method", title=title)
     for name in ("policies", "trials", "interrupted", "success (95 %)"):
         table.add_column(name, justify="right")
@@ -209,7 +219,7 @@ def _show(found: Comparison, title: str) -> None:
 
 
 def _values(row: Estimates) -> list[str]:
-    """Return success and return of a row, with their intervals."""
+    """Return success and return of a row as texts, with their 95 % intervals."""
     success = row.success, row.success_interval
     returns = row.returns, row.returns_interval
     return [f"{v:.3f} ({low:.2f}..{high:.2f})" for v, (low, high) in (success, returns)]

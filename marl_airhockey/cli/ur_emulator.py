@@ -13,17 +13,20 @@ from marl_airhockey.cli.options import console
 from marl_airhockey.cli.progress import waiting
 
 ADDRESS = "127.0.0.5"
-"""Default address of the emulator"""
+"""Default address of the emulator."""
 Address = Annotated[
     str,
     typer.Option(
-        help="Loopback address of the emulated robot; each robot needs its own, as "
-        "clients cannot choose the ports."
+        help="Loopback address of the emulated robot, 127.x.x.x. Each robot needs its "
+        "own, because the ports are fixed."
     ),
 ]
 
 ur_emulator = typer.Typer(
-    help="An emulator of a UR5e's controller, for ur_rtde and other clients."
+    help="Emulate the controller of a UR5e until Ctrl+C, for ur_rtde and other "
+    "clients.\n\nThe arm presses a paddle on an empty table. The dashboard, script and "
+    "RTDE ports respond like those of PolyScope 5.12. Only the script of ur_rtde is "
+    "run, no other URScript."
 )
 
 
@@ -34,19 +37,15 @@ def open_emulator(
     fault: Annotated[
         list[str] | None,
         typer.Option(
-            help="Fault at a set time, NAME@3s, or NAME@3s-5s to end it again; "
-            "repeatable."
+            help="Fault at a set time after the start: NAME@3s, or NAME@3s-5s to "
+            "switch it off at 5 s. Can be repeated."
         ),
     ] = None,
     polyscope: Annotated[
-        str, typer.Option(help="Version of PolyScope that it reports.")
+        str, typer.Option(help="Version of PolyScope that the emulator reports.")
     ] = "5.12.2",
 ) -> None:
-    """Emulate a UR5e with PolyScope 5.12 until Ctrl+C.
-
-    The arm presses a paddle on an empty table. Dashboard, script and RTDE ports answer
-    as the real ones; URScript beyond the script of ur_rtde is not run.
-    """
+    """Emulate a UR5e with PolyScope 5.12 until Ctrl+C."""
     if context.invoked_subcommand is not None:
         return
     _check_loopback(address)
@@ -68,7 +67,7 @@ def open_emulator(
         console.print(
             f"UR5e at {address}: RTDE 30004, script 30003, dashboard 29999\n"
             f"faults: airhockey ur-emulator fault NAME --address {address}\n"
-            "Ctrl+C ends it"
+            "Ctrl+C stops the emulator"
         )
 
     with contextlib.suppress(KeyboardInterrupt):
@@ -78,9 +77,12 @@ def open_emulator(
 @ur_emulator.command("fault")
 def switch_fault(
     name: Annotated[
-        str | None, typer.Argument(help="Name of the fault; None lists all.")
+        str | None,
+        typer.Argument(help="Name of a fault; by default all faults are listed."),
     ] = None,
-    off: Annotated[bool, typer.Option("--off", help="Switch it off.")] = False,
+    off: Annotated[
+        bool, typer.Option("--off", help="Switch the fault off instead of on.")
+    ] = False,
     address: Address = ADDRESS,
 ) -> None:
     """Switch a fault of the running emulator on or off."""
@@ -96,19 +98,20 @@ def switch_fault(
 
 @ur_emulator.command("status")
 def show_status(address: Address = ADDRESS) -> None:
-    """Print what the running emulator does: safety, program, pose, force, commands.
+    """Print the state of the running emulator.
 
-    Commands are counted by their numbers in the script of ur_rtde: 24 is servoL.
+    The state contains safety mode, running script, pose, force and commands. Commands
+    are counted by their number in the script of ur_rtde; 24 is servoL.
     """
     for name, value in _ask(address, "status").items():
         console.print(f"{name:10} {value}")
 
 
 def _ask(address: str, do: str, **order: Any) -> dict[str, Any]:
-    """Return the answer of the running emulator at an address.
+    """Return the response of the running emulator at an address.
 
     Raises:
-        RuntimeError: There is none.
+        RuntimeError: No emulator is running there.
     """
     from marl_airhockey.hardware.lab.door import DoorClient, port_in
     from marl_airhockey.hardware.ur_emulator.emulator import door_file
@@ -120,8 +123,8 @@ def _ask(address: str, do: str, **order: Any) -> dict[str, Any]:
         client = None
     if client is None:
         raise RuntimeError(
-            f"ur-emulator: none is running at {address}; start one with airhockey "
-            f"ur-emulator --address {address}"
+            f"ur-emulator: no emulator is running at {address}; start one with "
+            f"airhockey ur-emulator --address {address}"
         )
     answer = client.ask(do, **order)
     client.close()
@@ -129,14 +132,16 @@ def _ask(address: str, do: str, **order: Any) -> dict[str, Any]:
 
 
 def _check_loopback(address: str) -> None:
-    """Refuse an address that other machines can reach, or that is none.
+    """Check that an address is an IPv4 loopback address.
 
     Raises:
-        ValueError: One of these.
+        ValueError: It is another address, or not an address.
     """
     try:
         found = ipaddress.ip_address(address)
     except ValueError:
         found = None
     if found is None or not found.is_loopback or found.version != 4:
-        raise ValueError(f"--address: {address!r} is no loopback address (127.x.x.x)")
+        raise ValueError(
+            f"--address {address!r}: expected a loopback address, 127.x.x.x"
+        )

@@ -28,18 +28,25 @@ def watch(
     episodes: Annotated[int, typer.Option(help="Number of episodes.", min=1)] = 1,
     video: Annotated[
         Path | None,
-        typer.Option(help="Write a .gif, .webp or .mp4 instead of a window."),
+        typer.Option(
+            help="Video to write instead of opening a window: .gif, .webp or .mp4."
+        ),
     ] = None,
     viewpoint: Annotated[
-        str, typer.Option(help="top, or a viewpoint of the backend: agentview...")
+        str,
+        typer.Option(
+            help="Camera of the images: top; on robosuite also frontview, agentview or "
+            "birdview; on a real table also table or rectified."
+        ),
     ] = "top",
     host: cli_play.Host = "127.0.0.1",
     port: cli_play.Port = 0,
     browser: cli_play.Browser = True,
 ) -> None:
-    """Watch a driver play, in a window or as a video; or a recording of play.
+    """Show episodes of a driver, or a recording, or write a video of them.
 
-    --host, --port and --browser are those of a recording's page.
+    A driver is shown in a window. A recording is shown on a page in the browser;
+    --host, --port and --browser apply to this page only.
     """
     from marl_airhockey.rollouts.watch import show_episodes
 
@@ -50,7 +57,9 @@ def watch(
             watch_recording(Path(name), video)
         return
     if any(map(is_recording, Path(name).glob("*"))):
-        raise ValueError(f"{name}: holds recordings; name one of its folders")
+        raise ValueError(
+            f"{name} is a folder of recordings; give the folder of one of them"
+        )
     _, driver, game, keywords = environment.one_driver(name, scenario)
     with environment.table(keywords) as table:
         show_episodes(game, driver, table, seed, episodes, video, viewpoint=viewpoint)

@@ -1,1 +1,1 @@
-"""Data: what recordings hold, how they are made, and how they become worlds again."""
+"""Recordings and datasets: writing, reading, checking, relabelling and conversion."""

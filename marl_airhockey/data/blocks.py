@@ -1,4 +1,4 @@
-"""Blocks of steps that wait to be written, and the tables that they become."""
+"""Blocks of steps in memory, and the tables that are written from them."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 
 class PendingSteps(NamedTuple):
-    """Steps that wait to be written."""
+    """Steps that are not written yet."""
 
     episode: int
     first: int
-    """Number of the first of them"""
+    """Number of the first step in its episode."""
     size: int
-    """Number of steps"""
+    """Number of steps."""
     rows: Columns
 
 
@@ -32,7 +32,7 @@ def step_table(blocks: Sequence[PendingSteps], names: Iterable[str]) -> pa.Table
     """Return the table of the steps of some blocks.
 
     Args:
-        blocks: Blocks, in order.
+        blocks: Blocks of steps, in order.
         names: Names of the columns.
     """
     sizes = [block.size for block in blocks]
@@ -70,7 +70,7 @@ class DiskWriter:
 
     def __init__(self, path: Path, part: int) -> None:
         self.part = part
-        """Number of the next part"""
+        """Number of the next part."""
         self._path, self._thread = path, ThreadPoolExecutor(1, "recorder")
         self._work: tuple[Future[None], int] | None = None
 
@@ -80,12 +80,12 @@ class DiskWriter:
         blocks: Sequence[PendingSteps],
         names: Iterable[str],
     ) -> None:
-        """Have the thread write the rows of episodes, if there are any, and a part.
+        """Start writing the table of episodes, if there are rows, and a part of steps.
 
         Args:
             episodes: Rows of the episodes.
             blocks: Steps of the part, in order.
-            names: Names of their columns.
+            names: Names of the columns of steps.
         """
         work = self._thread.submit(self._write, episodes, blocks, [*names])
         self._work = work, len(blocks)
@@ -102,13 +102,13 @@ class DiskWriter:
             write_table(step_table(blocks, names), part_path(self._path, self.part))
 
     def collect(self, wait: bool) -> int | None:
-        """Return the number of blocks that were written; None while it is not known.
+        """Return the number of blocks that were written; None if writing continues.
 
         Args:
-            wait: Whether to wait for the thread.
+            wait: True to wait for the thread.
 
         Raises:
-            OSError: The disk takes no more; none was written.
+            OSError: Writing failed, for example because the disk is full.
         """
         if self._work is None:
             return 0
@@ -121,5 +121,5 @@ class DiskWriter:
         return count
 
     def close(self) -> None:
-        """End the thread."""
+        """Stop the thread."""
         self._thread.shutdown()

@@ -1,4 +1,4 @@
-"""Plot of what recordings hold: returns, lengths, places, speeds, gaps, players."""
+"""Plot of returns, lengths, positions, speeds, gaps and players in recordings."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ DRAWN = (
     *("state.position", "state.velocity", "state.time", "returns"),
     "sensed.visible",
 )
-"""Columns that are plotted"""
+"""Columns that are plotted."""
 BINS = 40
 
 
 def plot_content(paths: Sequence[Path], out: Path) -> None:
-    """Write a PNG of what recordings of one scenario hold.
+    """Write a PNG with the content of recordings of one scenario.
 
     Raises:
-        ValueError: Recordings that differ, or without steps; named.
+        ValueError: The recordings have different environments, or no steps.
     """
     head = shared_head(paths)
     scene = make_scenario(head["scenario"], **head.get("options", {})).scene
@@ -42,7 +42,7 @@ def plot_content(paths: Sequence[Path], out: Path) -> None:
         players[who] += len(found)
         episodes += found
     if not episodes:
-        raise ValueError(f"{paths[0]}: there are no steps in it")
+        raise ValueError(f"{paths[0]}: it contains no steps")
     figure, axes = plt.subplots(3, 2, figsize=(9, 9), dpi=DPI, layout="constrained")
     steps, dt = sum(map(len, episodes)), head["control_dt"]
     figure.suptitle(f"{head['scenario']}: {len(episodes)} episodes, {steps} steps")
@@ -58,7 +58,9 @@ def plot_content(paths: Sequence[Path], out: Path) -> None:
         edges = [np.linspace(-h, h, n) for h, n in zip(half, (60, 31), strict=True)]
         positions = _vectors(episodes, "state.position", where)
         axis.hist2d(*positions.T, bins=edges, cmap="Blues", norm="symlog")
-        axis.set(aspect="equal", xlabel="x, m", ylabel="y, m", title=f"{name}: places")
+        axis.set(
+            aspect="equal", xlabel="x, m", ylabel="y, m", title=f"{name}: positions"
+        )
     axes[1, 1].set_visible("puck" in bodies)
     speeds = {
         name: np.linalg.norm(_vectors(episodes, "state.velocity", where), axis=-1)
@@ -67,7 +69,7 @@ def plot_content(paths: Sequence[Path], out: Path) -> None:
     _histogram(axes[2, 0], speeds, "speed, m/s")
     last, gaps = axes[2, 1], [gap * dt for e in episodes for gap in _gaps(e)]
     if gaps:
-        _histogram(last, {"": gaps}, "time for which a puck was unseen, s")
+        _histogram(last, {"": gaps}, "time for which a puck was not detected, s")
     else:
         last.set_axis_off()
     names = "\n".join(f"{who}: {n}" for who, n in players.most_common(12))
@@ -76,12 +78,12 @@ def plot_content(paths: Sequence[Path], out: Path) -> None:
 
 
 def _vectors(episodes: Sequence[Episode], name: str, where: slice) -> Array:
-    """Return a column (n, 2) of some bodies in all steps."""
+    """Return a column of some bodies in all steps, (n, 2)."""
     return np.concatenate([e.columns[name][:, where].reshape(-1, 2) for e in episodes])
 
 
 def _gaps(episode: Episode) -> Iterator[int]:
-    """Yield the numbers of steps for which a puck was unseen."""
+    """Yield the lengths, in steps, of the gaps in which a puck was not detected."""
     visible = episode.columns.get("sensed.visible", np.ones((len(episode), 0), bool))
     for puck in visible.T:
         edges = np.diff(np.concatenate([[0], ~puck, [0]]).astype(np.int8))
@@ -89,7 +91,7 @@ def _gaps(episode: Episode) -> Iterator[int]:
 
 
 def _histogram(axes: Axes, values: Mapping[str, Any], label: str) -> None:
-    """Plot histograms over each other."""
+    """Plot several histograms in one panel."""
     for (name, numbers), colour in zip(values.items(), (INK, "#d04010"), strict=False):
         axes.hist(numbers, bins=BINS, color=colour, alpha=0.6, label=name)
     axes.set(xlabel=label, ylabel="episodes" if len(values) == 1 else "steps")

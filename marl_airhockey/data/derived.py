@@ -1,4 +1,4 @@
-"""Recordings made of recordings: repaired, merged, divided, resumed."""
+"""Repairing, merging, splitting and resuming of recordings."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from marl_airhockey.data.reader import (
 from marl_airhockey.data.writer import RecordingWriter, whole_recording
 
 PASSING = ("began", "versions", "columns", "format", "observation_labels")
-"""Keys of a head that may differ where a recording is resumed"""
+"""Keys of the metadata that may differ when a recording is resumed."""
 
 
 def repaired(path: Path, out: Path) -> list[str]:
-    """Write the good episodes of a recording as a new one; return what was wrong.
+    """Write the intact episodes of a recording as a new one; return the faults.
 
     Raises:
-        ValueError: Not even its head can be read, or no episode, or there is such a
-            folder as ``out``.
+        ValueError: The metadata or all episodes cannot be read, or the folder ``out``
+            exists.
     """
     head, wrong, cut = read_head(path), list[str](), dict[int, str]()
-    with suppress(ValueError):  # A part cannot be read, which is named below.
+    with suppress(ValueError):  # `episodes_of` reports a file that cannot be read.
         cut = missing_steps(path)
     with whole_recording(out, head) as writer:
         for episode in episodes_of(path, bad=wrong):
@@ -43,15 +43,15 @@ def repaired(path: Path, out: Path) -> list[str]:
         wrong += cut.values()
         if not writer.episodes:
             words = "; ".join(wrong)
-            raise ValueError(f"{path}: no episode of it can be read: {words}")
+            raise ValueError(f"{path}: no episode can be read: {words}")
     return wrong
 
 
 def merged(paths: Sequence[Path], out: Path) -> None:
-    """Write recordings of one kind as one.
+    """Write recordings of the same environment as one recording.
 
     Raises:
-        ValueError: Recordings that differ, or one that makes no sense; named.
+        ValueError: The recordings have different environments, or one is damaged.
     """
     head, seats = shared_head(paths), [read_head(p).get("players", []) for p in paths]
     players = [_together(seat) for seat in zip(*seats, strict=True)]
@@ -62,7 +62,7 @@ def merged(paths: Sequence[Path], out: Path) -> None:
 
 
 def _together(players: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the description of a seat in which several players have played."""
+    """Return the description of a seat in which several players played."""
     names = {name: [player[name] for player in players] for name in players[0]}
     return {
         name: values[0]
@@ -73,18 +73,17 @@ def _together(players: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def divided(path: Path, out: Path, share: float, seed: int) -> list[Path]:
-    """Write the episodes of a recording as two, `train` and `test`; return both.
+    """Split a recording at random into `train` and `test`; return both paths.
 
     Raises:
-        ValueError: Not at least one episode for each, or a recording that makes no
-            sense; named.
+        ValueError: One of them would have no episode, or the recording is damaged.
     """
     head, count = read_head(path), len(read_episode_rows(path))
     tested = round(share * count) if 0.0 < share < 1.0 else 0
     if not 0 < tested < count:
         raise ValueError(
-            f"--test {share}: {tested} of the {count} episodes; expected at least one "
-            "for train and one for test"
+            f"--test {share}: {tested} of {count} episodes; expected at least one "
+            "episode for train and one for test"
         )
     drawn = np.random.default_rng(seed).permutation(count)[:tested]
     paths = [out / "train", out / "test"]
@@ -102,22 +101,22 @@ def resume(path: Path, head: dict[str, object]) -> RecordingWriter:
 
     Args:
         path: Folder of the recording.
-        head: Head with which the recording is made now.
+        head: Metadata of the recording as it is made now.
 
     Raises:
-        ValueError: It was made with another head; what differs is named.
-        RuntimeError: Another process writes it.
+        ValueError: The metadata differ from those of the recording.
+        RuntimeError: Another process writes the recording.
     """
     known = read_head(path)
     for name in dict.fromkeys((*head, *known)):
         if name in PASSING:
             continue
-        # As it looks after JSON: tuples are lists there.
+        # Compare values after a round trip through JSON, which turns tuples into lists.
         now, before = json.loads(json.dumps(head.get(name))), known.get(name)
         if now != before:
             raise ValueError(
                 f"{path}: it was recorded with {name} {before!r}, not {now!r}; "
-                "name another folder"
+                "give another folder"
             )
     rows = read_episode_rows(path)
     counts = step_counts(path, len(rows))

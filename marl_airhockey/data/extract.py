@@ -1,4 +1,4 @@
-"""Extraction: where puck and paddle were, out of a video of a calibrated table."""
+"""Extraction of puck and paddle trajectories from a video of a calibrated table."""
 
 from __future__ import annotations
 
@@ -25,41 +25,42 @@ from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 LOOKED = 5
-"""Number of pictures, spread over a video, in which the tags are looked for"""
+"""Number of frames, spread over a video, in which the tags are searched."""
 SEVERAL = 0.1
-"""Share of pictures with two pucks from which on a video is refused"""
+"""Largest share of frames with two pucks in a video."""
 PADDLE_TOP = 0.06
-"""Height of a paddle's top above the table, m"""
+"""Height of the top of a paddle above the table, m."""
 
 
 @dataclass(frozen=True)
 class Trajectories:
-    """Trajectories out of one video of N pictures."""
+    """Trajectories from a video of N frames."""
 
     time: Array
-    """(N,) s; of a recording, since its first episode began, without what lay
-    between episodes"""
+    """Times (N,), s. For a recording, they count from the start of its first episode,
+    without the frames between episodes."""
     puck: Array
-    """(N, 2) table frame, m; nan where it was not seen"""
+    """Positions of the puck (N, 2), table frame, m; nan where it was not detected."""
     paddle: Array
-    """(N, 2) the same of the paddle's middle"""
+    """Positions of the paddle's centre (N, 2), table frame, m; nan where it was not
+    detected."""
     table: str
-    """Name of the table's preset"""
+    """Name of the table's preset."""
 
     def gaps(self, of: Array) -> list[tuple[float, float]]:
-        """Return begin and end, s, of the times in which ``of`` was not seen."""
+        """Return start and end, s, of the gaps in positions (N, 2) of a body."""
         unseen = np.isnan(of[:, 0]).astype(np.int8)
         edges = np.diff(np.concatenate([[0], unseen, [0]]))
-        # The last picture before and the first one after.
+        # A gap lasts from the last frame before it to the first frame after it.
         begins = np.maximum(np.flatnonzero(edges == 1) - 1, 0)
         ends = np.minimum(np.flatnonzero(edges == -1), len(self.time) - 1)
         times = zip(self.time[begins].tolist(), self.time[ends].tolist(), strict=True)
         return list(times)
 
     def write(self, path: Path) -> None:
-        """Write a CSV with a row a picture; what was not seen is left empty.
+        """Write a CSV file with a row per frame for `airhockey fit-table`.
 
-        `airhockey fit-table` reads it.
+        Cells of a body that was not detected are empty.
         """
         partial = path.with_suffix(".part")
         with partial.open("w", newline="") as file:
@@ -72,15 +73,15 @@ class Trajectories:
 
 
 def extract(path: Path, rig: Rig | None = None) -> Trajectories:
-    """Return the trajectories out of a video, or out of a recording with one beside it.
+    """Return the trajectories in a video, or in a recording with a video.
 
     Args:
-        path: of a video, or of a recording.
-        rig: of its table; None for the one that the recording holds.
+        path: Path of a video, or folder of a recording.
+        rig: Rig of the table; None for the one in the recording.
 
     Raises:
-        ValueError: no video, one without the table, of a camera that was moved since it
-            was calibrated, or with two pucks.
+        ValueError: There is no video, no rig, or no body in the video; the camera was
+            moved since its calibration; or there are two pucks.
     """
     recorded = path.parent if path.name == FILM else path
     times: Array | None = None
@@ -89,12 +90,13 @@ def extract(path: Path, rig: Rig | None = None) -> Trajectories:
         rig = rig or own
     if rig is None:
         raise ValueError(
-            f"{path}: which table is this? --rig FILE, or name a recording that has it"
+            f"{path}: the rig of the table is unknown; add --rig FILE, or give a "
+            "recording that contains it"
         )
     table, view = TABLES[rig.table], rig.view
     if rig.paddle is None:
         raise ValueError(
-            "the rig does not know the paddle's colour: calibrate anew, and click it"
+            "the rig has no colour of the paddle; calibrate again and click the paddle"
         )
     half = float(table.size[0]) / 2, float(table.size[1]) / 2
     puck = Detector(view, rig.puck, table.puck_radius, half, readout=rig.readout)
@@ -110,12 +112,12 @@ def extract(path: Path, rig: Rig | None = None) -> Trajectories:
         rows.append((frame.taken, place, paddles.place if paddles else unseen))
     if not any(np.isfinite([*row[1], *row[2]]).any() for row in rows):
         raise ValueError(
-            f"{path}: no picture shows a puck or a paddle; is it a video of the rig's "
-            "table, in the light of its calibration?"
+            f"{path}: no frame shows a puck or a paddle; expected a video of the rig's "
+            "table, in the light of its calibration"
         )
     if several > SEVERAL * len(rows):
         raise ValueError(
-            f"{path}: {several} of {len(rows)} pictures show two pucks; film one"
+            f"{path}: {several} of {len(rows)} frames show two pucks; record one puck"
         )
     taken, places, moving = (np.array(column) for column in zip(*rows, strict=True))
     if times is not None:
@@ -126,10 +128,10 @@ def extract(path: Path, rig: Rig | None = None) -> Trajectories:
 
 
 def _recorded(path: Path) -> tuple[Path, Rig | None, Array]:
-    """Return the video in a recording, its rig, and when its pictures were taken.
+    """Return the video of a recording, its rig, and the times of its frames.
 
-    The times (N,) are those since the first episode began, s; nan for pictures that
-    belong to no episode.
+    The times (N,), s, count from the start of the first episode. They are nan for
+    frames outside of all episodes.
     """
     recording, video = read_recording(path), path / FILM
     if not video.exists():
@@ -138,7 +140,7 @@ def _recorded(path: Path) -> tuple[Path, Rig | None, Array]:
         )
     whole = [episode for episode in recording.episodes if len(episode)]
     if not whole or "device.moment" not in whole[0].columns:
-        raise ValueError(f"{path}: no step of it has a picture")
+        raise ValueError(f"{path}: no step has a frame")
     taken = read_times(video)
     played = np.zeros(len(taken), np.bool_)
     cut = episodes_without_film(path, recording.episodes)
@@ -146,7 +148,7 @@ def _recorded(path: Path) -> tuple[Path, Rig | None, Array]:
         warnings.warn(f"{words}; left out", RuntimeWarning, stacklevel=3)
     whole = [episode for episode in whole if episode.index not in cut]
     if not whole:
-        raise ValueError(f"{path}: every episode lacks pictures")
+        raise ValueError(f"{path}: frames are missing in every episode")
     for episode in whole:
         moments = episode.columns["device.moment"]
         played |= (taken >= moments[0]) & (taken <= moments[-1])
@@ -161,7 +163,7 @@ def _recorded(path: Path) -> tuple[Path, Rig | None, Array]:
 
 
 def _pictures(path: Path) -> Iterator[CameraFrame]:
-    """Give the pictures of a video, the time in s from its first one."""
+    """Yield the frames of a video; their times, s, count from the first frame."""
     source = FileSource(path, realtime=False)
     source.open()
     try:
@@ -172,21 +174,25 @@ def _pictures(path: Path) -> Iterator[CameraFrame]:
 
 
 def _check_view(path: Path, rig: Rig) -> None:
-    """Refuse a video that does not show the table as the rig's camera does."""
+    """Check that the video shows the table in the same view as the rig's camera.
+
+    Raises:
+        ValueError: The video has no frames, or another view.
+    """
     pictures = [frame.image for frame in _spread(path)]
     if not pictures:
-        raise ValueError(f"{path}: there is no picture in it")
+        raise ValueError(f"{path}: the video has no frames")
     trouble = view_trouble(rig.view, pictures, rig.known_tags)
     if trouble:
         raise ValueError(f"{path}: {trouble}")
 
 
 def _spread(path: Path) -> list[CameraFrame]:
-    """Return some pictures from all over a video."""
+    """Return some frames, spread over a video."""
     capture = cv2.VideoCapture(str(path))
     count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     capture.release()
-    # A film that was cut off does not tell how long it is.
+    # The number of frames is unknown if writing the video was interrupted.
     every = max(count // LOOKED, 1) if count > 0 else 15
     found: list[CameraFrame] = []
     for frame in _pictures(path):

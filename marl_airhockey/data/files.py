@@ -1,4 +1,4 @@
-"""Folders of recordings: those in a folder, and what those of one dataset share."""
+"""Folders of recordings and datasets."""
 
 from __future__ import annotations
 
@@ -16,54 +16,55 @@ from marl_airhockey.sim.core.recording import META
 from marl_airhockey.sim.jit.folders import cache_folder
 
 NAME = re.compile(r"^\w[-.\w]*(/\w[-.\w]*)*$")
-"""Form of the name of an exported dataset"""
+"""Pattern of the name of an exported dataset."""
 PREFIX = "airhockey"
-"""First part of the names of the named datasets"""
+"""First part of the names of the named datasets."""
 ALIKE = ("scenario", "options", "observe", "control_dt", "profile")
-"""Keys of heads that recordings of one dataset must share"""
+"""Keys of the metadata that must be equal in all recordings of one dataset."""
 
 
 def dataset_folder(name: str) -> Path:
-    """Return the folder of a named dataset, which may not have been built yet."""
+    """Return the folder of a named dataset, which does not have to exist."""
     return cache_folder() / "datasets" / name
 
 
 def shown_name(path: Path) -> str:
-    """Return a path as it is shown: of a named dataset, its name and part."""
+    """Return a path for display; for a named dataset its name and part."""
     root = dataset_folder("")
     return str(path.relative_to(root) if path.is_relative_to(root) else path)
 
 
 def dataset_of(path: Path) -> str:
-    """Return the name of the dataset that a recording is a part of; "" for none."""
+    """Return the name of the dataset that contains a recording; "" for none."""
     root = dataset_folder("")
     return str(path.parent.relative_to(root)) if path.is_relative_to(root) else ""
 
 
 def is_recording(path: Path) -> bool:
-    """Return whether a path is the folder of a recording."""
+    """Return True if a path is the folder of a recording."""
     return (path / META).is_file()
 
 
 def recordings_in(paths: Sequence[Path]) -> list[Path]:
-    """Return the recordings among some paths and in the folders among them.
+    """Return the folders of all recordings in some paths.
 
     Args:
-        paths: Recordings, folders, and names of datasets that have been built.
+        paths: Recordings, folders of recordings, and names of built datasets.
 
     Raises:
-        ValueError: A path that is not there, or no recording at all.
+        ValueError: A path does not exist, there are no recordings, or a recording is
+            given twice.
     """
     found: list[Path] = []
     for path in paths:
         named = not path.exists() and path.parts[:1] == (PREFIX,)
         where = dataset_folder(str(path)) if named else path
         if not where.exists():
-            hint = f"; airhockey data get {path}" if named else ""
+            hint = f"; build it by airhockey data get {path}" if named else ""
             raise ValueError(f"{path}: there is no such file or folder{hint}")
         found += sorted(meta.parent for meta in where.rglob(META))
     if not found:
-        raise ValueError(f"{paths[0]}: there are no recordings in it ({META})")
+        raise ValueError(f"{paths[0]}: it contains no recording (no {META})")
     places = [path.resolve() for path in found]
     for path, place in zip(found, places, strict=True):
         if places.count(place) > 1:
@@ -72,51 +73,49 @@ def recordings_in(paths: Sequence[Path]) -> list[Path]:
 
 
 def whole_recordings_in(paths: Sequence[Path]) -> list[Path]:
-    """Return the recordings of `recordings_in`, of which no step is missing.
+    """Return the recordings in some paths, after checking that no step is missing.
 
     Raises:
-        ValueError: See there, or episodes of a recording lack steps, with the remedy.
+        ValueError: See `recordings_in`, or steps are missing in a recording.
     """
     found = recordings_in(paths)
     for path in found:
         if lacking := missing_steps(path):
             raise ValueError(
-                f"{path}: {len(lacking)} of its episodes lack steps; airhockey data "
-                f"repair {path} --out NEW keeps the good ones"
+                f"{path}: steps are missing in {len(lacking)} episodes; airhockey data "
+                f"repair {path} --out NEW writes the intact episodes"
             )
     return found
 
 
 def one_recording(path: Path) -> Path:
-    """Return the only recording of a path, a folder or a named dataset.
+    """Return the only recording in a folder or a named dataset.
 
     Raises:
-        ValueError: There is none, or there are several.
+        ValueError: There is no recording, or there are several.
     """
     found = recordings_in([path])
     if len(found) > 1:
         names = ", ".join(shown_name(each) for each in found[:4])
-        raise ValueError(f"{path}: there are several recordings; name one: {names}")
+        raise ValueError(f"{path}: it contains several recordings; give one: {names}")
     return found[0]
 
 
 def new_recording(folder: Path, scenario: str) -> Path:
-    """Return a path for a new recording in a folder, named by the time."""
+    """Return the path of a new recording in a folder, named by time and scenario."""
     now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S-%f")
     return folder / f"{now}-{scenario}"
 
 
 @contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
-    """Make a folder that is there when it is complete and, after any error, not.
-
-    Yields the path at which it is to be written.
+    """Yield a temporary folder that becomes a new folder if there is no error.
 
     Raises:
-        ValueError: There is such a folder.
+        ValueError: The folder exists.
     """
     if path.exists():
-        raise ValueError(f"{path}: there is such a folder; name another")
+        raise ValueError(f"{path}: the folder exists; give another")
     with (
         parent_of(path) as parent,
         tempfile.TemporaryDirectory(dir=parent, prefix=".part-") as part,
@@ -129,16 +128,16 @@ def whole_folder(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def parent_of(path: Path) -> Iterator[Path]:
-    """Make the folder of a path; remove a new one again if nothing is left in it.
+    """Create the parent folder of a path; remove it at the end if it is empty and new.
 
     Raises:
-        ValueError: It cannot be made.
+        ValueError: The folder cannot be created.
     """
     parent, fresh = path.parent, not path.parent.exists()
     try:
         parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ValueError(f"{path}: cannot be made: {error.strerror}") from error
+        raise ValueError(f"{path}: cannot be created: {error.strerror}") from error
     try:
         yield parent
     finally:
@@ -147,13 +146,19 @@ def parent_of(path: Path) -> Iterator[Path]:
 
 
 def named_folder(root: Path | None, name: str) -> Path:
-    """Return the folder of a dataset below that of all; None for ``datasets``.
+    """Return the folder of a dataset.
+
+    Args:
+        root: Folder of all datasets; None for ``datasets``.
+        name: Name of the dataset.
 
     Raises:
-        ValueError: The name is no path below it.
+        ValueError: The name is not a relative path of words.
     """
     if not NAME.match(name):
-        raise ValueError(f"--name {name!r}: expected words and numbers, as juggle/mine")
+        raise ValueError(
+            f"--name {name!r}: expected words and numbers, for example juggle/mine"
+        )
     return (root or Path("datasets")) / name
 
 
@@ -163,19 +168,19 @@ def size_of(recording: Path) -> int:
 
 
 def shared_head(recordings: Sequence[Path]) -> dict[str, Any]:
-    """Return what the heads of recordings share.
+    """Return the metadata of the first recording, after comparing it with the others.
 
     Raises:
-        ValueError: Recordings that differ in what they must share, named.
+        ValueError: The recordings have different values of a key in `ALIKE`.
     """
     heads = [read_head(path) for path in recordings]
     for path, head in zip(recordings, heads, strict=True):
         for name in ALIKE:
             if name not in head:
-                raise ValueError(f"{path}: its head has no {name!r}")
+                raise ValueError(f"{path}: meta.json has no key {name!r}")
             if head[name] != heads[0][name]:
                 raise ValueError(
-                    f"{path}: {name} is {head[name]!r}, that of {recordings[0]} is "
-                    f"{heads[0][name]!r}; learn from one kind at a time"
+                    f"{path}: {name} is {head[name]!r}, but in {recordings[0]} it is "
+                    f"{heads[0][name]!r}; use recordings with the same value"
                 )
     return heads[0]

@@ -1,4 +1,4 @@
-"""Film of a recording: columns that refer to its frames, and the frames."""
+"""Video of a recording: the columns that refer to its frames, and the frames."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from marl_airhockey.types import Array
 
 
 def film_columns(film: Film) -> Columns:
-    """Return columns (1, ...) of a film: number and time of its newest frame.
+    """Return columns (1, ...) with number and time of the newest frame of a video.
 
-    Before the first frame the number is -1 and the time nan. Times are of the monotonic
-    clock, as ``device.moment``, the time of the state.
+    Before the first frame the number is -1 and the time is nan. Times are in s, on the
+    monotonic clock, like ``device.moment``, the time of the state.
     """
     number, taken = film.last or (-1, np.nan)
     return {"frame": np.array([number], np.int64), "frame_taken": np.array([taken])}
 
 
 def episodes_without_film(path: Path, episodes: Iterable[Episode]) -> dict[int, str]:
-    """Return messages about episodes whose last pictures the film lacks, by episode.
+    """Return messages about the episodes whose last frames are missing, by index.
 
     Args:
         path: Folder of the recording.
-        episodes: Its episodes.
+        episodes: Episodes of the recording.
     """
     film = path / FILM
     if not film.exists():
@@ -39,24 +39,24 @@ def episodes_without_film(path: Path, episodes: Iterable[Episode]) -> dict[int, 
 
 
 def film_gap(path: Path, episode: Episode, count: int) -> str:
-    """Return a message if the film ends before an episode; "" if it does not.
+    """Return a message if the video ends before an episode; "" if it does not.
 
     Args:
         path: Folder of the recording.
-        episode: Episode of it.
-        count: Number of frames in the film.
+        episode: Episode of the recording.
+        count: Number of frames in the video.
     """
     last = int(episode.columns.get("frame", np.zeros(0)).max(initial=-1))
     if last < count:
         return ""
     return (
-        f"{path}: episode {episode.index}: the film ends {last + 1 - count} pictures "
-        "before it"
+        f"{path}: episode {episode.index}: the video ends {last + 1 - count} frames "
+        "before the episode"
     )
 
 
 def count_frames(film: Path) -> int:
-    """Return the number of frames that are in a film."""
+    """Return the number of frames in a video."""
     capture, count = cv2.VideoCapture(str(film)), 0
     while capture.grab():
         count += 1
@@ -65,10 +65,10 @@ def count_frames(film: Path) -> int:
 
 
 class FilmFrames:
-    """Frames of a film, which are read in order.
+    """Frames of a video, which are read in order.
 
     Args:
-        path: Path of the film.
+        path: Path of the video.
     """
 
     def __init__(self, path: Path) -> None:
@@ -83,13 +83,13 @@ class FilmFrames:
         """Return a frame (H, W, 3) uint8, BGR.
 
         Raises:
-            ValueError: The film ends before it.
+            ValueError: The video ends before the frame.
         """
         if number < self._number:
             self._open()
         while self._number < number:
             known, image = self._capture.read()
             if not known:
-                raise ValueError(f"{self.path}: it has no picture {number}")
+                raise ValueError(f"{self.path}: there is no frame {number}")
             self._number, self._image = self._number + 1, np.asarray(image)
         return self._image

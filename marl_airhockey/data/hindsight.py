@@ -1,7 +1,7 @@
-"""Hindsight: recorded play as data of goals that were reached in it.
+"""Hindsight relabelling of recordings (Andrychowicz et al., 2017).
 
-An episode that missed its goal reached others (Andrychowicz et al., 2017). Copies of it
-get such a goal, end where it is reached first, and are successes.
+An episode that missed its goal reached other goals. A copy of the episode gets one of
+these goals. It ends where the goal is first reached, and is a success.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from marl_airhockey.types import Array
 
 ACHIEVED, DESIRED = "observation.achieved_goal", "observation.desired_goal"
 DROPPED = ("memory.", "term.")
-"""Beginnings of columns that follow from the former goal"""
+"""Prefixes of the columns that depend on the original goal."""
 
 
 def with_hindsight(
@@ -31,12 +31,12 @@ def with_hindsight(
 ) -> Path:
     """Write a recording as episodes of a goal task that reach their goals.
 
-    Observations have goals apart, as with goals="dict". Each copy of an episode has a
-    goal that is sampled, uniformly, from those that it reached.
+    Observations have the form of goals="dict". The goal of each copy of an episode is
+    sampled uniformly from the goals that the episode reached.
 
     Args:
-        path: Recording.
-        scenario: Name of a task with goals, and with the bodies of the recorded one.
+        path: Folder of the recording.
+        scenario: Name of a task with goals and with the bodies of the recorded one.
         out: Folder of the new recording.
         copies: Number of copies of each episode.
         seed: Seed of the goals.
@@ -45,11 +45,11 @@ def with_hindsight(
         ``out``.
 
     Raises:
-        ValueError: A scenario without goals, one with other bodies, or a recording in
-            which no goal was reached.
+        ValueError: The scenario has no goals or other bodies, or no goal was reached in
+            the recording.
     """
     if not has_goals(scenario):
-        raise ValueError(f"{scenario}: it has no goals; leave out --hindsight")
+        raise ValueError(f"{scenario}: this scenario has no goals; remove --hindsight")
     head = read_head(path)
     new = new_head(head, scenario, {"goals": "dict"})
     game = make_scenario(scenario, **new["options"])
@@ -64,16 +64,16 @@ def with_hindsight(
                     if found is not None:
                         writer.write(found)
         if not writer.episodes:
-            raise ValueError(f"{path}: no goal of {scenario} was reached in it")
+            raise ValueError(f"{path}: no episode reached a goal of {scenario}")
     return out
 
 
 def _copy(
     game: GoalScenario, episode: Episode, rng: np.random.Generator
 ) -> Episode | None:
-    """Return an episode with another goal; None if it reached none.
+    """Return an episode with another goal; None if it reached no goal.
 
-    A goal must not be met at the start, and it must be one that can be met at all.
+    A goal must not be met at the start, and it must be a goal that can be met.
     """
     first, columns = _without_goal(episode.first), _without_goal(episode.columns)
     start, achieved = first[ACHIEVED][0], columns[ACHIEVED][:, 0]
@@ -102,7 +102,7 @@ def _as(goal: Array, like: Array) -> Array:
 
 
 def _ends(met: Array) -> dict[str, Any]:
-    """Return rewards and ends (T,) of an episode whose last step meets its goal."""
+    """Return rewards (T, 1) and ends (T,) of an episode that meets its goal last."""
     reward = met.astype(np.float64)[:, None]
     return {
         "reward": reward,

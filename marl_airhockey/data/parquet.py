@@ -1,4 +1,4 @@
-"""Parquet: columns of numpy arrays as tables, and back."""
+"""Conversion of columns of NumPy arrays to Parquet tables, and back."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 EXTRA = "data"
-"""Extra that brings pyarrow"""
+"""Extra that installs pyarrow."""
 SETTINGS: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
-"""Settings of all files"""
+"""Settings of all Parquet files."""
 KEYS = ("episode", "step")
-"""Columns of steps that number the rows"""
+"""Columns with the numbers of episode and step of a row."""
 
 
 def table_of(episode: Array, step: Array, columns: Columns) -> pa.Table:
     """Return a table of n steps.
 
     Args:
-        episode: (n,) numbers of episodes.
-        step: (n,) numbers of steps in them.
+        episode: Number of the episode of each step (n,).
+        step: Number of each step in its episode (n,).
         columns: Arrays (n, ...) by name.
     """
     require("pyarrow", EXTRA)
@@ -41,13 +41,13 @@ def table_of(episode: Array, step: Array, columns: Columns) -> pa.Table:
         size = int(np.prod(values.shape[1:], dtype=np.int64))
         if values.ndim == 1:
             arrays[name] = flat
-        elif size:  # Parquet has no lists of nothing.
+        elif size:  # Parquet has no lists of length 0.
             arrays[name] = pa.FixedSizeListArray.from_arrays(flat, size)
     return pa.table(arrays)
 
 
 def warm_up() -> None:
-    """Make the first calls of pyarrow, which are slow."""
+    """Run the first calls of pyarrow, which are slow."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -61,7 +61,7 @@ def columns_of(table: pa.Table, layout: Mapping[str, Column]) -> Columns:
     """Return columns (n, ...) of a table of n steps.
 
     Raises:
-        ValueError: A column that is missing, or does not fit its description; named.
+        ValueError: A column is missing, or does not match its description.
     """
     return {name: _values(table, name, column) for name, column in layout.items()}
 
@@ -83,26 +83,26 @@ def _values(table: pa.Table, name: str, column: Column) -> Array:
             raise ValueError(f"column {name}: values are missing")
     kind = found.type
     if not (pa.types.is_primitive(kind) and found.null_count == 0):
-        raise ValueError(f"column {name}: {kind}, or with values missing")
+        raise ValueError(f"column {name}: type {kind}, or missing values")
     values = found.to_numpy(zero_copy_only=False)
     if values.dtype != np.dtype(column.dtype) or size != column.size:
         raise ValueError(
-            f"column {name}: {size} numbers of {values.dtype} a step, expected "
+            f"column {name}: {size} numbers of {values.dtype} per step, expected "
             f"{column.size} of {column.dtype}"
         )
-    # A copy of its own, as arrow's arrays cannot be written.
+    # Copy the values, because arrays of pyarrow are read-only.
     return np.array(values).reshape(rows, *column.shape)
 
 
 def write_table(table: pa.Table, path: Path) -> None:
-    """Write a table to the disk so that the file is there whole or not at all.
+    """Write a table to a file atomically: a failed write leaves no partial file.
 
     Args:
-        table: Table.
+        table: Table to write.
         path: Path of the file, which may exist.
 
     Raises:
-        OSError: A full disk, or a folder that cannot be written; names the file.
+        OSError: The disk is full, or the folder cannot be written.
     """
     import pyarrow.parquet as pq
 
@@ -119,17 +119,17 @@ def write_table(table: pa.Table, path: Path) -> None:
 
 
 def read_table(path: Path, names: Iterable[str] | None = None) -> pa.Table:
-    """Read a table, or some of its columns; names that it lacks are left out.
+    """Read a table, or some of its columns; names without a column are ignored.
 
     Raises:
-        ValueError: No such file, or no parquet; names the file.
+        ValueError: The file does not exist, or is not a Parquet file.
     """
     require("pyarrow", EXTRA)
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
-        # One by one: pyarrow.parquet.read_table would look at the folder, too.
+        # pyarrow.parquet.read_table would also inspect the folder.
         file = pq.ParquetFile(path, page_checksum_verification=True)
         known = file.schema_arrow.names
         wanted = None if names is None else [n for n in names if n in known]

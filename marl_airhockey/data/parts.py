@@ -1,4 +1,4 @@
-"""Parts: the files of steps of a recording, in order."""
+"""Parts of a recording: its files of steps, in order."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from marl_airhockey.data.parquet import SETTINGS, read_table
 from marl_airhockey.sim.core.recording import STEPS
 
 ROWS = 65_536
-"""Number of steps from which on a group of rows is written"""
+"""Least number of steps in a row group, except for the last one."""
 
 
 def part_path(recording: Path, number: int) -> Path:
@@ -22,10 +22,10 @@ def parts_of(recording: Path) -> list[Path]:
 
 
 def merge_parts(recording: Path) -> None:
-    """Replace the parts of a recording by one.
+    """Replace the parts of a recording by one part.
 
-    The whole takes the place of the first, then the others go. If this is cut off, the
-    others repeat steps of the whole, which `reader` leaves out.
+    The merged part replaces the first one, then the others are deleted. After an
+    interruption, the others repeat steps of the merged part. `reader` skips them.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

@@ -1,4 +1,4 @@
-"""Plots of what was played: trajectories on the table, over time."""
+"""Plots of trajectories on the table and over time."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from marl_airhockey.types import Array
 
 
 def plot_trajectories(found: Trajectories, path: Path) -> None:
-    """Write a PNG: both paths on the table, coloured by time, and x and y over time.
+    """Write a PNG of both trajectories, on the table and as x and y over time.
 
-    Gaps, in which something was not seen, are dotted on the table and grey over time.
+    Colours on the table show the time. Gaps, in which a body was not detected, are
+    dotted on the table and grey over time.
     """
     figure, (field, *rows) = plt.subplots(
         3, 1, figsize=(8, 8), dpi=DPI, layout="constrained", height_ratios=(2.4, 1, 1)
@@ -40,12 +41,12 @@ def plot_trajectories(found: Trajectories, path: Path) -> None:
             axes.axvspan(begin, end, color=INKS[0], alpha=0.25, linewidth=0)
         axes.set_ylabel(f"{'xy'[axis]}, m")
         tidy(axes, "best" if axis == 0 else None)
-    rows[-1].set_xlabel("time, s; grey: the puck was not seen")
+    rows[-1].set_xlabel("time, s; grey: puck not detected")
     save(figure, path)
 
 
 def _path(axes: Axes, time: Array, places: Array, colours: str, name: str) -> None:
-    """Draw a path, the later the darker, dotted across its gaps."""
+    """Plot a trajectory, darker at later times and dotted across its gaps."""
     seen = np.isfinite(places[:, 0])
     if seen.sum() < 2:
         return

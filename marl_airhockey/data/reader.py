@@ -1,4 +1,4 @@
-"""Reader of recordings: episode by episode; what makes no sense is named."""
+"""Reader of recordings, one episode at a time."""
 
 from __future__ import annotations
 
@@ -28,30 +28,30 @@ from marl_airhockey.sim.core.recording import (
 from marl_airhockey.types import Array
 
 LARGEST_META = 1 << 24
-"""Largest `meta.json`, bytes"""
+"""Largest size of `meta.json`, bytes."""
 NEEDED = ("episode", "length", "reason")
-"""Columns without which a table of episodes is none"""
+"""Columns that a table of episodes must have."""
 
 
 def read_head(path: Path) -> dict[str, Any]:
-    """Return the contents of a recording's `meta.json`.
+    """Return the metadata of a recording, the contents of its `meta.json`.
 
     Raises:
-        ValueError: No recording, or one of another version; names it.
+        ValueError: The folder is not a recording, or has another format.
     """
     file = path / META
     try:
         if file.stat().st_size > LARGEST_META:
-            raise ValueError(f"{file}: larger than {LARGEST_META} bytes")
+            raise ValueError(f"{file}: it is larger than {LARGEST_META} bytes")
         head = json.loads(file.read_text())
     except OSError as error:
         raise ValueError(
             f"{path}: cannot be read as a recording: {error.strerror}"
         ) from error
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise ValueError(f"{file}: no recording of marl_airhockey") from error
+        raise ValueError(f"{file}: not a recording of marl_airhockey") from error
     if not isinstance(head, dict) or "format" not in head:
-        raise ValueError(f"{file}: no recording of marl_airhockey")
+        raise ValueError(f"{file}: not a recording of marl_airhockey")
     found, dt = head["format"], head.get("control_dt")
     if found != FORMAT:
         raise ValueError(
@@ -59,19 +59,19 @@ def read_head(path: Path) -> dict[str, Any]:
             f"this version reads format {FORMAT}"
         )
     if not isinstance(head.get("scenario"), str):
-        raise ValueError(f"{path}: it does not name its scenario")
+        raise ValueError(f"{path}: its meta.json has no scenario")
     if not (isinstance(dt, (int, float)) and 0.0 < dt < float("inf")):
-        raise ValueError(f"{path}: control_dt {dt!r} is no time of a step")
+        raise ValueError(f"{path}: control_dt {dt!r}; expected a time above 0 s")
     if not isinstance(head.get("columns"), dict):
-        raise ValueError(f"{path}: it does not describe its columns")
+        raise ValueError(f"{path}: its meta.json has no columns")
     return head
 
 
 def read_episode_rows(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of a recording's `episodes.parquet`; none without it.
+    """Return the rows of `episodes.parquet`; an empty list without this file.
 
     Raises:
-        ValueError: It cannot be read, or has no episodes in order; names the file.
+        ValueError: The file cannot be read, or its episodes are not in order.
     """
     file = path / EPISODES
     if not file.exists():
@@ -84,13 +84,13 @@ def read_episode_rows(path: Path) -> list[dict[str, Any]]:
 
 
 def missing_steps(path: Path) -> dict[int, str]:
-    """Return messages about steps that lack at the ends of episodes, by episode.
+    """Return messages about missing steps at the ends of episodes, by index.
 
-    An episode whose recording was interrupted lacks nothing, and `episodes_of` names
-    one of which all is missing before another.
+    An episode whose recording was interrupted has no missing steps. `episodes_of`
+    reports an episode without any step that is followed by others.
 
     Raises:
-        ValueError: A part that cannot be read; names it.
+        ValueError: A part cannot be read.
     """
     rows = read_episode_rows(path)
     counts = step_counts(path, len(rows))
@@ -105,10 +105,10 @@ def missing_steps(path: Path) -> dict[int, str]:
 
 
 def step_counts(path: Path, episodes: int) -> Array:
-    """Return the number of steps that are there of each episode.
+    """Return the number of existing steps of each episode.
 
     Raises:
-        ValueError: A part that cannot be read; names it.
+        ValueError: A part cannot be read.
     """
     last = np.zeros(episodes, np.int64)
     for part in parts_of(path):
@@ -124,8 +124,7 @@ def read_recording(path: str | Path) -> Recording:
     """Read a recording.
 
     Raises:
-        ValueError: No recording, one of another version, or one that makes no sense;
-            names it and what is wrong.
+        ValueError: The folder is not a recording, has another format, or is damaged.
     """
     path = Path(path)
     return Recording(path, read_head(path), list(episodes_of(path)))
@@ -136,18 +135,16 @@ def episodes_of(
     names: Collection[str] | None = None,
     bad: list[str] | None = None,
 ) -> Iterator[Episode]:
-    """Yield the episodes of a recording, of which one at a time is in memory.
+    """Yield the episodes of a recording, with one at a time in memory.
 
     Args:
         path: Folder of the recording.
-        names: Names of the columns that are read, of which some may be missing; None
-            for all.
-        bad: List to which is added what is wrong, so that good episodes are read on;
-            None to raise instead.
+        names: Names of the columns to read, some of which may be missing; None for all.
+        bad: List to which faults are appended, while intact episodes are still read;
+            None to raise an error instead.
 
     Raises:
-        ValueError: Something is wrong, or no column of ``names`` is there; names file
-            or episode.
+        ValueError: The recording is damaged, or none of the columns exists.
     """
     path = Path(path)
     head, rows = read_head(path), read_episode_rows(path)
@@ -178,11 +175,10 @@ def episodes_of(
 def _layout(
     path: Path, head: dict[str, Any], names: Collection[str] | None
 ) -> dict[str, Column]:
-    """Return the columns that are read, by name.
+    """Return the columns to read, by name.
 
     Raises:
-        ValueError: A description that makes no sense, or none of the names in it;
-            names the recording.
+        ValueError: The description of the columns is damaged, or none of them exists.
     """
     known = head["columns"]
     if names and known and not known.keys() & {*names}:
@@ -209,7 +205,7 @@ class _Piece:
 
 @dataclass
 class _Pieces:
-    """Steps of an episode as they are read."""
+    """Steps of an episode that have been read."""
 
     episode: int
     columns: list[Columns] = field(default_factory=list)
@@ -217,7 +213,7 @@ class _Pieces:
     gap: str = ""
 
     def add(self, piece: _Piece) -> None:
-        """Add further steps; those that are there already are left out."""
+        """Add steps, except for those that were already added."""
         again = self.next - piece.first
         if again < 0:
             self.gap = self.gap or f"steps {self.next} to {piece.first - 1} are missing"
@@ -237,7 +233,7 @@ def _steps_of(part: Path, layout: dict[str, Column]) -> list[_Piece]:
     """Return the steps in a part, by episode.
 
     Raises:
-        ValueError: It makes no sense; names the file.
+        ValueError: The file is damaged.
     """
     table = read_table(part, [*KEYS, *layout])
     keys = {name: Column("int32", ()) for name in KEYS}
@@ -253,7 +249,9 @@ def _steps_of(part: Path, layout: dict[str, Column]) -> list[_Piece]:
     pieces = []
     for start, stop in itertools.pairwise(edges):
         if (np.diff(step[start:stop]) != 1).any() or step[start] < 0:
-            raise ValueError(f"{part}: the steps of episode {episode[start]} jump")
+            raise ValueError(
+                f"{part}: the steps of episode {episode[start]} are not consecutive"
+            )
         own = {name: values[start:stop] for name, values in columns.items()}
         pieces.append(_Piece(int(episode[start]), int(step[start]), stop - start, own))
     return pieces
@@ -266,17 +264,17 @@ def _joined(
     layout: dict[str, Column],
     bad: list[str] | None,
 ) -> Iterator[Episode]:
-    """Yield an episode, if it makes sense."""
+    """Yield an episode if it is intact."""
     where, whole = f"{path}: episode {pieces.episode}", {}
     if pieces.episode >= len(rows) or pieces.gap:
-        words = pieces.gap or f"it is not in {EPISODES}"
+        words = pieces.gap or f"it is missing in {EPISODES}"
         return _complain(f"{where}: {words}", bad)
     for name in layout:
         whole[name] = np.concatenate([columns[name] for columns in pieces.columns])
         lacks = np.flatnonzero(
             ~np.isfinite(whole[name]).reshape(pieces.next, -1).all(1)
         )
-        # Before the first step there is no action.
+        # There is no action before the first step.
         lacks = lacks[lacks >= (not name.startswith(("state.", "observation")))]
         if name in FINITE and lacks.size:
             words = f"{where}: {name} is not finite at step {lacks[0]}"

@@ -1,4 +1,4 @@
-"""Record: episodes of a driver, played in batches and written to one recording."""
+"""Recording of episodes of a driver, which are played in batches."""
 
 from __future__ import annotations
 
@@ -39,28 +39,28 @@ def record_episodes(
     film: bool = False,
     progress: Callable[[float], None] = lambda done: None,
 ) -> Path:
-    """Let a driver play at ``paddle_0`` and its team's seats, and record it.
+    """Record episodes of a driver at ``paddle_0`` and the other seats of its team.
 
-    A recording that was interrupted is resumed.
+    An interrupted recording is resumed.
 
     Args:
         driver: Driver that plays.
-        name: Its name in the recording.
+        name: Name of the driver in the recording.
         scenario: Name of the scenario, or a scenario object.
         episodes: Number of episodes; episode i has the seed ``seed + i``.
         path: Folder of the recording.
         seed: Seed of the first episode.
-        keywords: Keywords of the environment, drivers of other seats among them.
-        film: Whether to keep the frames of a real table's camera.
-        progress: Function that is called with the number of episodes that are done.
+        keywords: Keywords of the environment, with the drivers of other seats.
+        film: True to record the video of a real table's camera.
+        progress: Function that is called with the number of completed episodes.
 
     Returns:
         ``path``.
 
     Raises:
-        ValueError: A seat without a driver, a folder that cannot be made, one with
-            another recording or other files, or a film where there is no camera.
-        OSError: A full disk.
+        ValueError: A seat has no driver; the folder cannot be created, or contains
+            another recording or other files; or there is no camera for a video.
+        OSError: The disk is full.
     """
     live = is_live(keywords.get("backend", DEFAULT_BACKEND))
     at_once = 1 if live else min(episodes, AT_ONCE)
@@ -72,12 +72,15 @@ def record_episodes(
             begun = writer.episodes
             if begun > episodes:
                 raise ValueError(
-                    f"{path}: it has {begun} episodes already; give a larger number, "
-                    "or another folder"
+                    f"{path}: it already has {begun} episodes; give a larger number or "
+                    "another folder"
                 )
             progress(min(begun, episodes))
             if begun and film:
-                raise ValueError(f"{path}: a film cannot be resumed; name another")
+                raise ValueError(
+                    f"{path}: a recording with a video cannot be resumed; give another "
+                    "folder"
+                )
             reel = Film(camera, path / FILM) if camera is not None else None
             try:
                 if live:
@@ -107,22 +110,22 @@ def record_steps(
     seed: int,
     keywords: Keywords,
 ) -> Path:
-    """Record the fewest whole episodes that have a number of steps together.
+    """Record complete episodes until they have a number of steps in total.
 
     Args:
         driver: Driver that plays, in simulation.
-        name: Its name in the recording.
+        name: Name of the driver in the recording.
         scenario: Name of the scenario.
         steps: Least number of steps.
         path: Folder of the recording, which must not exist.
         seed: Seed of the first episode.
-        keywords: Keywords of the environment, drivers of other seats among them.
+        keywords: Keywords of the environment, with the drivers of other seats.
 
     Returns:
         ``path``.
 
     Raises:
-        ValueError: A seat without a driver, or a folder that exists.
+        ValueError: A seat has no driver, or the folder exists.
     """
     world = build_driven_world(driver, scenario, AT_ONCE, keywords)
     left = steps
@@ -139,7 +142,7 @@ def record_steps(
 
 
 def _head(world: World, name: str, seed: int, keywords: Keywords) -> dict[str, Any]:
-    """Return the head of a recording."""
+    """Return the metadata of a recording."""
     others = keywords.get("drivers", {})
     players = [
         _player(name if i == 0 else others.get(f"paddle_{i}", name))
@@ -149,10 +152,10 @@ def _head(world: World, name: str, seed: int, keywords: Keywords) -> dict[str, A
 
 
 def _opened(path: Path, head: dict[str, Any]) -> RecordingWriter:
-    """Begin a recording, or resume one.
+    """Start a recording, or resume one.
 
     Raises:
-        ValueError: The folder cannot be made, or holds something else.
+        ValueError: The folder cannot be created, or contains other files.
     """
     if is_recording(path):
         return resume(path, head)
@@ -162,7 +165,7 @@ def _opened(path: Path, head: dict[str, Any]) -> RecordingWriter:
         return RecordingWriter(path, head)
     except FileExistsError as error:
         raise ValueError(
-            f"{path}: holds something else; name another folder"
+            f"{path}: this folder contains other files; give another folder"
         ) from error
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from error
@@ -184,18 +187,18 @@ def _camera(world: World) -> Any:
 
 
 def _player(driver: Any) -> dict[str, Any]:
-    """Return how a seat is described in a head."""
+    """Return the description of a seat in the metadata."""
     name = driver if isinstance(driver, str) else type(driver).__name__
     return {"driver": name, "person": None}
 
 
 def _record_live(world: World, writer: RecordingWriter, film: Film | None) -> None:
-    """Play an episode at a real table; what was played is on the disk in a second.
+    """Play an episode on a real table; every step is on the disk within a second.
 
     Args:
-        world: World whose episode has begun.
+        world: World whose episode has started.
         writer: Writer of the recording.
-        film: Film of its camera; None for none.
+        film: Video of the camera; None to record no video.
     """
 
     def only(columns: Columns) -> Columns:

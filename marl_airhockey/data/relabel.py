@@ -1,4 +1,4 @@
-"""Relabelling: recorded play as data of other tasks with the same bodies."""
+"""Relabelling of recordings for other scenarios with the same bodies."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from marl_airhockey.rollouts.rollout import AT_ONCE
 from marl_airhockey.sim.core.recording import PLAYED, Episode, Recording
 
 LEFT_OUT = ("columns", "format", "observation_labels", *SHARED)
-"""Keys of a head that are not those of the relabelled recording"""
+"""Keys of the metadata that are not copied to the relabelled recording."""
 CUT = "the recording ends here"
-"""Reason of the end of an episode that its new rules would not have ended yet"""
+"""Reason for the end of an episode that the new rules do not end."""
 
 
 def relabelled(
@@ -27,21 +27,22 @@ def relabelled(
 ) -> Path:
     """Write a recording as if another scenario had been played.
 
-    An episode begins as the recorded one and ends where the new rules end it, or with
-    the recording.
+    An episode starts like the recorded one. It ends where the new rules end it, or at
+    the end of the recorded one.
 
     Args:
-        path: Recording.
+        path: Folder of the recording.
         scenario: Name of the new scenario.
         out: Folder of the new recording.
-        options: Fields of the new scenario; its table and seats are those of the
-            recorded one, unless they are given.
+        options: Options of the new scenario; by default its table and seats are those
+            of the recorded one.
 
     Returns:
         ``out``.
 
     Raises:
-        ValueError: The scenario has other bodies, or needs what was not recorded.
+        ValueError: The scenario has other bodies, or needs values that were not
+            recorded.
     """
     head = read_head(path)
     new = new_head(head, scenario, options or {})
@@ -56,15 +57,15 @@ def relabelled(
 def new_head(
     head: dict[str, Any], scenario: str, options: dict[str, Any]
 ) -> dict[str, Any]:
-    """Return the head of a recording that is relabelled for a scenario.
+    """Return the metadata of a recording that is relabelled for a scenario.
 
     Args:
-        head: Contents of its `meta.json`.
+        head: Metadata of the original recording.
         scenario: Name of the new scenario.
-        options: Fields of it, in addition to table and seats.
+        options: Options of the new scenario, in addition to table and seats.
 
     Raises:
-        ValueError: An unknown scenario or option.
+        ValueError: The scenario or an option does not exist.
     """
     chosen = {**_table_of(head), **options}
     game = make_scenario(scenario, **chosen)
@@ -78,13 +79,13 @@ def new_head(
 
 
 def _table_of(head: dict[str, Any]) -> dict[str, Any]:
-    """Return the options that a recording shares with all scenarios at its table."""
+    """Return the options of a recording that do not depend on its scenario."""
     known = {**head.get("options", {}), **head}
     return {name: known[name] for name in ("table", "seats") if name in known}
 
 
 def fitting(path: Path) -> list[str]:
-    """Return the names of the scenarios that a recording can be relabelled for."""
+    """Return the names of the scenarios for which a recording can be relabelled."""
     head = read_head(path)
     first = next((e for e in episodes_of(path) if len(e)), None)
     if first is None:
@@ -100,14 +101,14 @@ def fitting(path: Path) -> list[str]:
 
 
 def batches(episodes: Iterator[Episode]) -> Iterator[list[Episode]]:
-    """Yield some episodes at a time; those without steps are left out."""
+    """Yield batches of episodes, without those that have no steps."""
     whole = (episode for episode in episodes if len(episode))
     while batch := list(itertools.islice(whole, AT_ONCE)):
         yield batch
 
 
 def _cut(episode: Episode) -> Episode:
-    """Return a replayed episode up to its end by the rules of its scenario."""
+    """Return a replayed episode up to the end that its scenario defines."""
     columns = episode.columns
     ends = columns["terminated"] | columns["truncated"]
     ended, length = bool(ends.any()), len(episode)

@@ -1,4 +1,4 @@
-"""Summary of a recording: who played what, how long, how well."""
+"""Summary of a recording: scenario, players, length, success and return."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ class Summary:
     episodes: int
     steps: int
     cut_off: int
-    """Number of episodes without an end"""
+    """Number of episodes without an end."""
     success: float
-    """Share of episodes in which ``paddle_0`` succeeded; nan without episodes"""
+    """Share of episodes in which ``paddle_0`` succeeded; nan without episodes."""
     returns: float
-    """Mean return of ``paddle_0``"""
+    """Mean return of ``paddle_0``; nan without episodes."""
     bytes: int
 
     def row(self) -> list[str]:
-        """Return the cells of a table."""
-        cut = f" ({self.cut_off} cut off)" if self.cut_off else ""
+        """Return the cells of a row of the table of recordings."""
+        cut = f" ({self.cut_off} interrupted)" if self.cut_off else ""
         return [
             shown_name(Path(self.path)),
             f"{self.scenario}, {self.profile}",
@@ -43,16 +43,16 @@ class Summary:
         ]
 
     def to_json(self) -> dict[str, Any]:
-        """Return the fields, None for nan."""
+        """Return the fields as JSON, with None for nan."""
         fields = asdict(self)
         return {k: None if value != value else value for k, value in fields.items()}
 
 
 def summarize_recording(path: Path) -> Summary:
-    """Read a recording and sum it up.
+    """Read a recording and return its summary.
 
     Raises:
-        ValueError: no recording, or one that makes no sense; names the file.
+        ValueError: The folder is not a recording, or is damaged.
     """
     head, rows = read_head(path), read_episode_rows(path)
     steps = step_counts(path, len(rows))

@@ -1,4 +1,4 @@
-"""Verification of recordings: do the rules of today make of them what was recorded?"""
+"""Verification of recordings: comparison with values computed from the states."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from marl_airhockey.sim.core.recording import Columns, Recording
 from marl_airhockey.types import Array
 
 MEASURED = ("clock", "round_trip", "pointer")
-"""Columns of play on a page that do not follow from states"""
+"""Columns of recordings of the page that cannot be computed from states."""
 EXACT = 1e-9
-"""Largest difference that rounding explains"""
+"""Largest difference that is explained by rounding."""
 
 
 def replay_differences(path: Path) -> dict[str, float]:
-    """Return the largest difference of each column from what a replay computes.
+    """Return the largest difference of each column from the value of a replay.
 
-    Columns that only one of both has differ by infinity, but for measured ones.
+    A column that only one of them has differs by infinity, except for measured columns.
 
     Raises:
-        ValueError: The recording cannot be replayed; named.
+        ValueError: The recording cannot be replayed.
     """
     head, found = read_head(path), dict[str, float]()
     if is_live(head.get("backend", DEFAULT_BACKEND)):
         raise ValueError(
-            f"{path}: measured on a real table, where commands and observations do not "
-            "follow from the states alone; leave out --replay"
+            f"{path}: this is a recording of a real table, whose commands and "
+            "observations cannot be computed from the states; remove --replay"
         )
     for batch in batches(episodes_of(path)):
         replayed = Replay(Recording(path, head, batch)).episodes()
@@ -52,7 +52,7 @@ def _differences(one: Columns, other: Columns) -> dict[str, float]:
 
 
 def distance(one: Array, other: Array) -> float:
-    """Return the largest difference; infinite where only one is finite."""
+    """Return the largest difference of two arrays; inf if only one value is finite."""
     one, other = (np.asarray(x, np.float64) for x in (one, other))
     same = (one == other) | (np.isnan(one) & np.isnan(other))
     with np.errstate(invalid="ignore"):

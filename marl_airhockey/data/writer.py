@@ -1,4 +1,4 @@
-"""Writer of recordings: what it has flushed survives a kill of the process."""
+"""Writer of recordings; flushed steps survive the end of the process."""
 
 from __future__ import annotations
 
@@ -30,29 +30,29 @@ from marl_airhockey.sim.core.recording import (
 )
 
 FLUSH = 0.5
-"""Longest time for which steps wait until they are on the disk, s"""
+"""Longest time between two flushes to the disk, s."""
 PART = 16_384
-"""Number of steps that wait at most"""
+"""Largest number of steps in memory before a flush."""
 
 
 @contextmanager
 def whole_recording(path: Path, head: Mapping[str, Any]) -> Iterator[RecordingWriter]:
-    """Write a recording that is there whole or, after any error, not at all.
+    """Yield the writer of a new recording, which is deleted after any error.
 
     Args:
-        path: Folder, which must not exist.
-        head: What holds for all episodes; its columns are those that are written.
+        path: Folder of the recording, which must not exist.
+        head: Metadata; the description of columns is replaced.
 
     Raises:
-        ValueError: There is such a folder.
+        ValueError: The folder exists or cannot be created.
     """
     with parent_of(path):
         try:
             writer = RecordingWriter(path, {**head, "columns": {}})
         except FileExistsError as error:
-            raise ValueError(f"{path}: there is such a folder; name another") from error
+            raise ValueError(f"{path}: the folder exists; give another") from error
         except OSError as error:
-            raise ValueError(f"{path}: cannot be made: {error.strerror}") from error
+            raise ValueError(f"{path}: cannot be created: {error.strerror}") from error
         try:
             with writer:
                 yield writer
@@ -64,15 +64,15 @@ def whole_recording(path: Path, head: Mapping[str, Any]) -> Iterator[RecordingWr
 class RecordingWriter:
     """Writer of a recording.
 
-    A thread of its own writes to the disk, so that `add` and `end` return at once.
+    A separate thread writes to the disk, so that `add` and `end` return immediately.
 
     Args:
-        path: Folder, which must not exist.
-        head: What holds for all episodes; JSON.
+        path: Folder of the recording, which must not exist.
+        head: Metadata that can be written as JSON.
 
     Raises:
-        FileExistsError: There is such a folder.
-        OSError: It cannot be made.
+        FileExistsError: The folder exists.
+        OSError: The folder cannot be created.
     """
 
     def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
@@ -96,11 +96,11 @@ class RecordingWriter:
 
         Args:
             path: Folder of a recording whose episodes are all complete.
-            head: Contents of its `meta.json`.
+            head: Metadata of the recording.
             episodes: Rows of its `episodes.parquet`.
 
         Raises:
-            RuntimeError: Another process writes it.
+            RuntimeError: Another process writes the recording.
         """
         writer = cls.__new__(cls)
         parts = parts_of(path)
@@ -124,7 +124,7 @@ class RecordingWriter:
         self._first: Columns | None = None
         self._waiting: list[PendingSteps] = []
         self._count, self._step = 0, 0
-        # The first calls of pyarrow take half a second.
+        # The first calls of pyarrow take half a second in total.
         warm_up()
         self._disk = DiskWriter(path, part)
         self._flushed, self._changed = time.monotonic(), False
@@ -137,7 +137,7 @@ class RecordingWriter:
 
     @property
     def episodes(self) -> int:
-        """Number of episodes that have begun."""
+        """Number of episodes that have started."""
         return len(self._episodes)
 
     def begin(
@@ -147,13 +147,13 @@ class RecordingWriter:
         number: int = 0,
         physics: Mapping[str, float] | None = None,
     ) -> None:
-        """Begin the next episode.
+        """Start the next episode.
 
         Args:
-            first: What is there before its first step.
-            seed: Seed of its world.
-            number: Number of the episode since the world had that seed.
-            physics: Its physical parameters.
+            first: Values before the first step, by column.
+            seed: Seed of the world.
+            number: Number of the episode since the world was seeded.
+            physics: Physics parameters of the episode.
         """
         self._place_first()
         own = {f"{PHYSICS}{k}": float(v) for k, v in (physics or {}).items()}
@@ -164,7 +164,7 @@ class RecordingWriter:
         self._step, self._changed = 0, True
 
     def add(self, row: Columns) -> None:
-        """Add a control step, which is on the disk within a second."""
+        """Add a control step; it is on the disk within a second."""
         self.add_rows({name: np.array(value)[None] for name, value in row.items()})
         self._flush_in_time()
 
@@ -172,7 +172,7 @@ class RecordingWriter:
         """Add control steps, arrays (T, ...).
 
         Raises:
-            ValueError: Columns that are not those of the steps before; named.
+            ValueError: The columns differ from those of previous steps.
         """
         lengths = {len(value) for value in columns.values()}
         if len(lengths) != 1:
@@ -188,13 +188,13 @@ class RecordingWriter:
             self.flush()
 
     def end(self, reason: str) -> None:
-        """End the episode, and say why it ended."""
+        """End the episode and store the reason."""
         self._place_first()
         self._episodes[-1]["reason"], self._changed = reason, True
         self._flush_in_time()
 
     def write(self, episode: Episode) -> None:
-        """Write a whole episode; one without a reason of its end is interrupted."""
+        """Write a complete episode, or one without a reason as interrupted."""
         self.begin(episode.first, episode.seed, episode.number, episode.physics)
         if len(episode):
             self.add_rows(episode.columns)
@@ -202,7 +202,7 @@ class RecordingWriter:
             self.end(episode.reason)
 
     def _flush_in_time(self) -> None:
-        """Have a thread write what waits; whoever adds steps must not wait for it."""
+        """Start a flush in the thread if it is due, without waiting for it."""
         written = self._collect(wait=False)
         if written and time.monotonic() - self._flushed > FLUSH:
             self._flushed = time.monotonic()
@@ -211,13 +211,13 @@ class RecordingWriter:
             self._disk.start(episodes, blocks, self._layout)
 
     def _collect(self, wait: bool) -> bool:
-        """Return whether the thread has written what it was given.
+        """Return True if the thread has completed the last flush.
 
         Args:
-            wait: Whether to wait for it.
+            wait: True to wait for the thread.
 
         Raises:
-            OSError: It could not; what it was given still waits.
+            OSError: The flush failed; its steps are still in memory.
         """
         try:
             count = self._disk.collect(wait)
@@ -229,14 +229,14 @@ class RecordingWriter:
         return count is not None
 
     def flush(self) -> None:
-        """Write the steps that wait, to the disk."""
+        """Write all steps in memory to the disk."""
         self._collect(wait=True)
         self._flushed = 0.0
         self._flush_in_time()
         self._collect(wait=True)
 
     def close(self) -> None:
-        """Write what waits, merge small parts, and close."""
+        """Write all steps, merge small parts, and close the recording."""
         if not self._lock.is_locked:
             return
         try:
@@ -247,14 +247,14 @@ class RecordingWriter:
                 merge_parts(self.path)
         finally:
             self._disk.close()
-            with suppress(OSError):  # Windows deletes no open file.
+            with suppress(OSError):  # Windows does not delete open files.
                 (self.path / ".lock").unlink()
             self._lock.release()
 
     def _place_first(self, columns: Columns | None = None) -> None:
-        """Put what was there before the first step in front of it.
+        """Add the values before the first step as step 0.
 
-        Only with its first step is it known which columns steps have.
+        This waits for the first step, because it defines the columns of a recording.
         """
         if self._first is None:
             return
@@ -271,16 +271,18 @@ class RecordingWriter:
         self._put({**missing, **first}, 1)
 
     def _put(self, columns: Columns, count: int) -> None:
-        """Let steps wait to be written."""
+        """Store steps in memory until the next flush."""
         if columns.keys() != self._layout.keys():
             odd = ", ".join(sorted(columns.keys() ^ self._layout.keys()))
-            raise ValueError(f"the columns of a recording change: {odd}")
+            raise ValueError(
+                f"columns {odd}: expected the same columns in all steps of a recording"
+            )
         rows = {}
         for name, column in self._layout.items():
             value = columns[name]
             if value.shape[1:] != column.shape:
                 raise ValueError(
-                    f"{name}: shape {value.shape[1:]} in a step, before {column.shape}"
+                    f"{name}: shape {value.shape[1:]}; expected {column.shape}"
                 )
             rows[name] = value.astype(column.dtype)
         block = PendingSteps(len(self._episodes) - 1, self._step, count, rows)

@@ -1,1 +1,1 @@
-"""Environments in the APIs of PettingZoo, Gymnasium and stable-baselines3."""
+"""Environments in the APIs of PettingZoo, Gymnasium, SB3 and TorchRL."""

@@ -1,4 +1,4 @@
-"""Attributes of environments that are built: which ones can still be set."""
+"""Check of the attributes that users set on an environment after its creation."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.sim.world.world import World
 
 LIKE = 0.8
-"""Likeness from which a name counts as misspelt"""
+"""Smallest similarity, 0 to 1, from which a name counts as a misspelling."""
 
 
 class CheckedAttributes:
-    """Mixin that refuses to set what only building an environment can set.
+    """Mixin that forbids setting what is fixed when an environment is created.
 
-    Other names are stored, as learning libraries store some of their own.
+    Other names are stored, because learning libraries store attributes of their own.
     """
 
     world: World
@@ -30,17 +30,17 @@ class CheckedAttributes:
 
 
 def refuse_built(world: World, name: str) -> None:
-    """Refuse the name of a keyword or of an option, and one that is nearly that.
+    """Raise an error for the name of a keyword or an option, or for a misspelling.
 
     Raises:
-        AttributeError: The name is one of these; the message says what to do.
+        AttributeError: The name is one of these. The message states what to do.
     """
     options = [field.name for field in fields(world.scenario)]
     names = [*Keywords.__annotations__, *options]
     if name in names:
         given = f"{name}=..." if name not in options else f'options={{"{name}": ...}}'
         raise AttributeError(
-            f"{name!r} cannot be set on an environment that is built; build one with "
+            f"{name!r} cannot be set after the environment is created; create one with "
             f"{given}"
         )
     near = get_close_matches(name, names, 1, LIKE)

@@ -1,4 +1,4 @@
-"""Descriptions of scenarios, read off the scenarios themselves."""
+"""Descriptions of scenarios and profiles as plain data."""
 
 from __future__ import annotations
 
@@ -35,20 +35,21 @@ from marl_airhockey.sim.core.rng import RandomStreams
 
 
 def what(scenario: Scenario) -> str:
-    """Return the sentence at the head of a scenario's file."""
+    """Return the first paragraph of the docstring of a scenario's module."""
     text = sys.modules[type(scenario).__module__].__doc__ or ""
     return text.strip().split("\n\n")[0]
 
 
 def _id(name: str) -> str | None:
-    """Return the gymnasium id of a scenario; None for one from outside."""
+    """Return the gymnasium id of a scenario; None if it is not in this library."""
     return gymnasium_id(name) if name in scenario_names() else None
 
 
 def summary() -> dict[str, Any]:
-    """Return the names of all scenarios, drivers and backends.
+    """Return the names of all scenarios, drivers, policies, backends and profiles.
 
-    A scenario of an installed package that cannot be built is left out, with a warning.
+    A scenario of an installed package that cannot be created is left out, with a
+    warning.
     """
     rows = []
     for name in (*scenario_names(), *plugin_names("scenarios")):
@@ -76,7 +77,7 @@ def summary() -> dict[str, Any]:
 
 
 def describe_profile(name: str) -> dict[str, Any]:
-    """Return what a profile senses and from which ranges its physics is drawn."""
+    """Return the end-to-end latency of a profile and the ranges of its physics."""
     profile = find_profile(name)
     least, longest = (1000.0 * end for end in delay_of(profile))
     follows = {key: follow.range for key, follow in profile.follows.items()}
@@ -91,14 +92,15 @@ def describe_profile(name: str) -> dict[str, Any]:
         }
         for key, pair in {**profile.ranges, **follows, **times}.items()
     ]
-    delay = f"{least:.0f} .. {longest:.0f} ms from an event to half of the answer"
+    delay = f"{least:.0f} .. {longest:.0f} ms from an event to 50 % of a velocity step"
     return {"name": name, "what": profile.what, "delay": delay, "parameters": rows}
 
 
 def describe(name: str) -> dict[str, Any]:
-    """Return all that a user has to know of a scenario, as plain data.
+    """Return the description of a scenario as plain data.
 
-    The class docstring by section, success, seats, observation, reward and options.
+    It contains the class docstring by section, success, seats, observation, reward and
+    options.
     """
     scenario = find_scenario(name)
     layout = build_world(name, 1, autoreset=True, keywords={}).observer.layout
@@ -152,7 +154,7 @@ UNITS = {
     **dict.fromkeys(("vx", "vy", "spin"), "m/s"),
     **dict.fromkeys(("age", "held"), "s"),
 }
-"""Units of elements of observations, by the last word of their label"""
+"""Units of elements of observations, by the last word of their label."""
 
 
 def unit_of(label: str) -> str:

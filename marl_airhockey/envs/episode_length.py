@@ -1,4 +1,4 @@
-"""Length of an episode, also as gymnasium's specifications hold it."""
+"""Length of an episode, also in the specification of gymnasium."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class EpisodeLength:
 
 
 class SpecifiedLength(EpisodeLength):
-    """Mixin whose ``spec`` always holds the length of an episode."""
+    """Mixin whose ``spec`` always contains the current length of an episode."""
 
     _spec: EnvSpec | None = None
 
     @property
     def spec(self) -> EnvSpec | None:
-        """Specification by which ``gymnasium.make`` built it, or None."""
+        """Specification that ``gymnasium.make`` set, or None."""
         if self._spec is not None:
             self._spec.max_episode_steps = self.world.max_cycles
         return self._spec

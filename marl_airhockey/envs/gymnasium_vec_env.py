@@ -1,4 +1,4 @@
-"""Gymnasium VectorEnv: many worlds of a single-agent scenario, stepped as one."""
+"""Gymnasium VectorEnv of many worlds of a scenario with one open seat."""
 
 from __future__ import annotations
 
@@ -36,21 +36,35 @@ from marl_airhockey.types import Array, Memory
 class AirHockeyVectorEnv(
     CheckedAttributes, SpecifiedLength, VectorEnv[Any, Any, Array]
 ):
-    """B worlds with one open seat as a gymnasium ``VectorEnv``.
+    """Gymnasium VectorEnv of B worlds of a scenario with one open seat.
 
-    ``infos`` are flat dicts of arrays (B, ...), with the same keys at reset and step;
-    see `infos.infos_of`.
+    - Observations: float32 array (B, D), SI units, ego frame of the seat. They are
+      uint8 images with observe="pixels" and dictionaries with goals="dict".
+    - Actions: target velocities (B, 2), divided by the top speed, -1 to 1, ego frame.
+    - Rewards: sums (B,) of the reward terms; with goals="dict", 1 if the goal is met,
+      else 0.
+    - Terminations (B,) bool: the episode ended by the rules of the scenario.
+    - Truncations (B,) bool: `max_cycles` steps have passed, or a real table interrupted
+      the episode.
+    - Infos: arrays (B, ...) by name, with the same keys at reset and step, see
+      `infos.infos_of`.
 
     Args:
-        scenario: its name, or a scenario object.
-        num_envs: B.
-        autoreset_mode: when a world that ended begins anew. "NextStep", as is usual in
-            gymnasium: in the next step, which ignores its action. "SameStep": at once;
-            the observation and the infos of the end are ``final_obs`` and
-            ``final_info``, with the masks ``_final_obs`` and ``_final_info``.
-            "Disabled": by `reset` with a ``reset_mask``.
-        render_mode: None or "rgb_array": a picture of each world.
-        **keywords: see `make.build_world`.
+        scenario: Name, code, class or object, see `registry.find_scenario`.
+        num_envs: Number of worlds, B.
+        autoreset_mode: Time of the reset of a world that ended.
+
+            - "NextStep", the default of gymnasium: in the next step, which ignores the
+              action of this world.
+            - "SameStep": in the same step. ``final_obs`` and ``final_info`` hold the
+              observation and the infos of the end, with the masks ``_final_obs`` and
+              ``_final_info``.
+            - "Disabled": by `reset` with a ``reset_mask``.
+        render_mode: "rgb_array" for an image of each world, or None.
+        **keywords: Shared keywords, see `make.parallel_env`.
+
+    Raises:
+        ValueError: The number of open seats is not one.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium declares it so
@@ -66,7 +80,7 @@ class AirHockeyVectorEnv(
         **keywords: Unpack[Keywords],
     ) -> None:
         self.autoreset_mode = _mode_of(autoreset_mode)
-        """When a world that ended begins again"""
+        """Time of the reset of a world that ended."""
         same = self.autoreset_mode is AutoresetMode.SAME_STEP
         self.world = build_world(scenario, num_envs, autoreset=same, keywords=keywords)
         check_one_open(self.world)
@@ -93,7 +107,7 @@ class AirHockeyVectorEnv(
 
     @property
     def physics(self) -> dict[str, Array]:
-        """Physical parameters of the episodes by name, (B,); copies."""
+        """Physics parameters of the episodes by name (B,); copies."""
         physics = self.world.episode.physics
         return {name: value.copy() for name, value in physics.items()}
 
@@ -106,13 +120,15 @@ class AirHockeyVectorEnv(
         """Begin an episode in every world.
 
         Args:
-            seed: world i gets seed + i, or the i-th of B numbers.
-            options: as those of `AirHockeyEnv.reset`, with a row for each world, or
-                ``{"reset_mask": (B,) bool}``: the worlds that begin anew; all others go
-                on, and no seed may be given.
+            seed: Seed s, with which world i gets the seed s + i, or a list of B seeds.
+                None continues with the current random streams.
+            options: Options of `AirHockeyEnv.reset`, with a row for each world. Or
+                ``{"reset_mask": (B,) bool}``, True for the worlds to reset. All other
+                worlds continue, and no seed may be given.
 
         Raises:
-            ValueError: a bad seed, mask, option or state, named.
+            ValueError: A seed, mask, option or state is not valid; the message names
+                it.
         """
         given = {} if options is None else options
         check_options(self.world, given, (*OPTIONS, MASK))
@@ -134,7 +150,7 @@ class AirHockeyVectorEnv(
                 f"reset_mask: expected {self.num_envs} bools, at least one of them True"
             )
         if seed is not None:
-            raise ValueError("seed: leave it out beside a reset_mask")
+            raise ValueError("seed: not possible with a reset_mask; leave it out")
         if not self.world.episode.number.all():
             raise RuntimeError("reset_mask: call reset() without one first")
         self._ended[mask] = False
@@ -144,23 +160,26 @@ class AirHockeyVectorEnv(
         return _rows(self.world.observation())
 
     def get_state(self) -> tuple[State, Memory]:
-        """Return the true states and the memories of all worlds, (B, ...)."""
+        """Return the true states and the memories of all worlds (B, ...)."""
         return self.world.get_state()
 
     def set_state(
         self, state: State, memory: Memory | None = None, worlds: Array | None = None
     ) -> Any:
-        """Go on from given states, see `World.set_state`; return the observations."""
+        """Continue from states, see `World.set_state`; return the observations."""
         observations = _rows(self.world.set_state(state, memory, worlds))
         self._ended[slice(None) if worlds is None else worlds] = False
         return observations
 
     def step(self, actions: Array) -> tuple[Any, Array, Array, Array, dict[str, Any]]:
-        """Move all worlds by one control step; actions (B, 2).
+        """Move all worlds by one control step.
+
+        Args:
+            actions: Target velocities (B, 2), divided by the top speed, ego frame.
 
         Raises:
-            RuntimeError: with "Disabled", an episode has ended and was not reset.
-            ValueError: a wrong shape, or an element that is not finite.
+            RuntimeError: With "Disabled", an episode has ended and was not reset.
+            ValueError: The shape is wrong, or an element is not finite.
         """
         if self._ended.any() and self.autoreset_mode is AutoresetMode.DISABLED:
             raise RuntimeError(
@@ -194,7 +213,7 @@ class AirHockeyVectorEnv(
         )
 
     def _begin_anew(self, worlds: Array, result: StepResult) -> None:
-        """Let worlds that ended in the step before begin; their step is none."""
+        """Begin an episode in worlds (n,) that ended, and clear their results."""
         self.world.reset_worlds(worlds)
         result.clear(worlds)
         result.observation = self.world.observation()
@@ -209,11 +228,11 @@ class AirHockeyVectorEnv(
         return dict(infos_of(result, self.world, alive))
 
     def render(self) -> tuple[Array, ...]:
-        """Return a picture (H, W, 3) uint8 of each world."""
+        """Return an image (H, W, 3) uint8 of each world."""
         return tuple(self._pictures.take())
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close the physics."""
+        """Close the backend and the drivers."""
         self.world.close()
 
 
@@ -223,13 +242,13 @@ def make_vector(
     max_episode_steps: int | None = None,
     **given: Any,
 ) -> AirHockeyVectorEnv:
-    """Build the environment, as ``gymnasium.make_vec`` asks for it.
+    """Create the environment; the entry point for ``gymnasium.make_vec``.
 
     Args:
-        scenario: Name of the scenario, or a scenario object.
+        scenario: Name, code, class or object, see `registry.find_scenario`.
         num_envs: Number of worlds, B.
-        max_episode_steps: Length after which an episode ends at the latest, in control
-            steps; None or -1 for its own.
+        max_episode_steps: Largest number of control steps of an episode; None or -1
+            for the number of the scenario.
         **given: Other arguments of `AirHockeyVectorEnv`.
     """
     envs = AirHockeyVectorEnv(scenario, num_envs, **given)
@@ -240,7 +259,7 @@ def make_vector(
 
 
 def _mode_of(mode: str | AutoresetMode) -> AutoresetMode:
-    """Return the mode of a name, "SameStep", "NextStep" or "Disabled"."""
+    """Return the mode with a name, such as "SameStep"."""
     modes = {m.value: m for m in AutoresetMode}
     names = [*modes, *(m.name for m in AutoresetMode)]
     if isinstance(mode, AutoresetMode):
@@ -249,11 +268,11 @@ def _mode_of(mode: str | AutoresetMode) -> AutoresetMode:
         return AutoresetMode[mode]
     if mode in modes:
         return modes[mode]
-    raise ValueError(f"autoreset_mode: {mode!r}; there are: {', '.join(names)}")
+    raise ValueError(f"autoreset_mode: {mode!r}; expected one of {', '.join(names)}")
 
 
 def _rows(observation: Observation) -> Any:
-    """Return the only seat's rows (B, ...) of an observation (B, 1, ...)."""
+    """Return the rows (B, ...) of an observation (B, 1, ...) of the only seat."""
     if isinstance(observation, np.ndarray):
         return observation[:, 0]
     return {name: value[:, 0] for name, value in observation.items()}

@@ -1,6 +1,6 @@
-"""Infos: numbers beside observation and reward, with the same keys at every call.
+"""Infos: further results of a step, with the same keys in every call.
 
-They are flat, as most clients of PettingZoo and gymnasium expect.
+They are flat, as most users of PettingZoo and gymnasium expect.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ def _term(name: str) -> str:
 
 
 def info_of(result: StepResult, world: World, i: int, alive: bool) -> dict[str, Any]:
-    """Return the info of an open seat of the only world.
+    """Return the info of an open seat of a single world.
 
-    Keys: ``applied_action`` (2,), ``success`` (latched), ``first_shot``, ``alive``,
-    ``cost``, ``constraint/speed`` and so on, and ``reward/<term>``; on a real table
-    ``interruption``, why it ended the episode, or "".
+    The keys are ``applied_action`` (2,), ``success`` of the episode so far,
+    ``first_shot``, ``alive``, ``cost``, ``reward/<term>`` and `CONSTRAINTS`. On a real
+    table ``interruption`` is the reason why it ended the episode, or "".
 
     Args:
-        result: of a step of one world.
-        world: the world.
-        i: index among the open seats.
-        alive: whether the seat still plays.
+        result: Result of a step of one world.
+        world: World of the result.
+        i: Index of the seat among the open seats.
+        alive: True if the seat is not eliminated.
     """
     rows = result.violation[0, world.open[i]].tolist()
     speed, acceleration, jerk, reach, cost = rows
-    # A dict display: this is a good part of the price of a step.
+    # A dict display, because this takes a considerable part of the time of a step.
     info = {
         "applied_action": result.applied_action[0, i],
         "success": result.success.item(i),
@@ -61,16 +61,16 @@ def infos_of(result: StepResult, world: World, alive: Array) -> dict[str, Array]
     """Return the infos of the only open seat of B worlds, arrays (B, ...).
 
     Args:
-        result: of a step.
-        world: the worlds.
-        alive: (B,) bool: whether the seat still plays.
+        result: Result of a step of B worlds.
+        world: Worlds of the result.
+        alive: True for worlds in which the seat is not eliminated (B,).
     """
     violation = result.violation[:, world.open[0]]
     columns = {name: violation[:, k] for k, name in enumerate(CONSTRAINTS)}
     return {
         "applied_action": result.applied_action[:, 0],
         "success": result.success[:, 0],
-        # The name under which stable-baselines3 looks for it.
+        # Stable-baselines3 reads the success under this name.
         "is_success": result.success[:, 0],
         "first_shot": result.first_shot,
         "alive": alive,

@@ -1,4 +1,4 @@
-"""Meanings of options, success and terms, read off the docstrings of a scenario."""
+"""Meanings of options, success and reward terms, from docstrings of a scenario."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from itertools import pairwise
 from marl_airhockey.sim.contracts.scenario import Scenario
 
 TERM = re.compile(r"^ *(\w+): (.+?)(?=\n *\w+: |\n\n|\Z)", re.MULTILINE | re.DOTALL)
-"""Line of a docstring, ``name: meaning``, and those that it goes on in."""
+"""Pattern of ``name: meaning`` in a docstring, with continuation lines."""
 
 
 SECTION = re.compile(r"^(Start|Termination):\n((?:(?: {4}.*)?\n?)+)", re.MULTILINE)
-"""Section of the docstring of a scenario's class"""
+"""Pattern of a section in the docstring of a scenario's class."""
 
 
 def description(kind: type[Scenario]) -> dict[str, str]:
     """Return the docstring of a scenario's class, by section.
 
     Returns:
-        ``description``, one paragraph a line, ``start`` and ``termination``; "" for
-        those that neither the class nor a class above it has. The description is
-        followed by that of a game that the class is derived from.
+        ``description`` with one paragraph per line, ``start`` and ``termination``. A
+        section is "" if neither the class nor a base class has it. The description of
+        a base class, unless it starts with "Base of", follows.
     """
     found = dict.fromkeys(("description", "start", "termination"), "")
     for base in reversed(kind.__mro__):
@@ -45,7 +45,7 @@ def option_meanings(kind: type[Scenario]) -> dict[str, str]:
     for body in _bodies(kind):
         for field, text in pairwise(body):
             if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
-                # Without a docstring it is that of the class above.
+                # A field without a docstring has the meaning in the base class.
                 name = field.target.id
                 found[name] = _docstring(text) or found.get(name, "")
     return found
@@ -54,7 +54,7 @@ def option_meanings(kind: type[Scenario]) -> dict[str, str]:
 def term_meanings(kind: type[Scenario]) -> dict[str, str]:
     """Return the meanings of reward terms, by name.
 
-    They stand in the docstrings of `reward_terms` and `all_reward_terms`, as lines
+    The docstrings of `reward_terms` and `all_reward_terms` contain them as lines
     ``name: meaning``.
     """
     found: dict[str, str] = {}
@@ -67,20 +67,20 @@ def term_meanings(kind: type[Scenario]) -> dict[str, str]:
 
 
 def success_meaning(kind: type[Scenario]) -> str:
-    """Return the docstring of `success`, without what it says of the shape."""
+    """Return the docstring of `success` without the shape and type."""
     text = _one_line(inspect.getdoc(kind.success) or "")
     return text.partition(" bool: ")[2] or text
 
 
 def _bodies(kind: type) -> Iterator[list[ast.stmt]]:
-    """Yield the statements of the scenario's classes, the topmost first."""
+    """Yield the statements of a scenario's classes, base classes first."""
     for base in reversed(kind.__mro__):
         if not issubclass(base, Scenario):
             continue
         try:
             source = textwrap.dedent(inspect.getsource(base))
         except OSError:
-            continue  # A class that was written at a prompt has no source.
+            continue  # A class defined at a prompt has no source.
         (statement,) = ast.parse(source).body
         assert isinstance(statement, ast.ClassDef)
         yield statement.body

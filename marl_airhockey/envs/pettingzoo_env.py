@@ -1,4 +1,4 @@
-"""PettingZoo ParallelEnv: one world, with dicts of agents."""
+"""PettingZoo ParallelEnv of one world."""
 
 from __future__ import annotations
 
@@ -32,28 +32,40 @@ Dicts = tuple[
 ]
 
 WINDOW = importlib.util.find_spec("pygame") is not None
-"""True if there is what a window needs: the extra "play"."""
+"""True if pygame is installed, which windows need; the extra "play" contains it."""
 
 
 class AirHockeyEnv(CheckedAttributes, EpisodeLength, ParallelEnv[str, Any, Any]):  # type: ignore[misc]
-    """World of a scenario whose open seats are the agents, ``paddle_0`` and so on.
+    """PettingZoo ParallelEnv of one world, whose open seats are the agents.
 
-    All agents stay to the end of the episode and end together. The info of an agent
-    is flat and has the same keys at reset and step, see `infos.info_of`.
+    The agents are ``paddle_0``, ``paddle_1`` and so on, without the seats that have a
+    driver. For each agent:
 
-    It can be copied and pickled at any moment, and the copy goes on by itself; an open
-    window is left behind.
+    - Observation: float32 array (D,), SI units, ego frame of the seat. It is a stack
+      of uint8 images with observe="pixels" and a dictionary with goals="dict".
+    - Action: target velocity (2,), divided by the top speed, -1 to 1, ego frame.
+    - Reward: sum of the reward terms; with goals="dict", 1 if the goal is met, else 0.
+    - Termination: the episode ended by the rules of the scenario.
+    - Truncation: `max_cycles` steps have passed, or a real table interrupted the
+      episode.
+    - Info: numbers with the same keys at reset and step, see `infos.info_of`.
+
+    All agents stay to the end of the episode and end together. The environment can be
+    copied and pickled at any moment. The copy is independent and has no window.
 
     Args:
-        scenario: its name, or a scenario object.
-        render_mode: None, "rgb_array" or "human".
-        viewpoint: Viewpoint of its pictures: "top", or one of the backend's.
-        **keywords: see `make.build_world`.
+        scenario: Name, code, class or object, see `registry.find_scenario`.
+        render_mode: "rgb_array", "human" or None for no images.
+        viewpoint: Camera of images, "top" or a viewpoint of the backend.
+        **keywords: Shared keywords, see `make.parallel_env`.
+
+    Raises:
+        ValueError: Every seat has a driver.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo declares it so
         "name": "marl_airhockey",
-        # Checkers of environments try every mode that is named here.
+        # Environment checkers try every mode in this list.
         "render_modes": ["human", "rgb_array"] if WINDOW else ["rgb_array"],
         "is_parallelizable": True,
         "render_fps": 20,
@@ -95,7 +107,7 @@ class AirHockeyEnv(CheckedAttributes, EpisodeLength, ParallelEnv[str, Any, Any])
 
     @property
     def teams(self) -> dict[int, list[str]]:
-        """Agents (driven ones too) by team."""
+        """Names of all seats by team, including seats with a driver."""
         teams: dict[int, list[str]] = {}
         for i, seat in enumerate(self.world.scene.seats):
             teams.setdefault(seat.team, []).append(f"paddle_{i}")
@@ -103,7 +115,7 @@ class AirHockeyEnv(CheckedAttributes, EpisodeLength, ParallelEnv[str, Any, Any])
 
     @property
     def group_map(self) -> dict[str, list[str]]:
-        """Open agents by team, as TorchRL's ``group_map`` and RLlib's policies ask."""
+        """Agents by team, for TorchRL's ``group_map`` and the policies of RLlib."""
         names = {f"team_{team}": agents for team, agents in self.teams.items()}
         mine = {
             k: [a for a in v if a in self.possible_agents] for k, v in names.items()
@@ -111,17 +123,17 @@ class AirHockeyEnv(CheckedAttributes, EpisodeLength, ParallelEnv[str, Any, Any])
         return {name: agents for name, agents in mine.items() if agents}
 
     def _check_agent(self, agent: str) -> None:
-        """Raise a KeyError for what is no agent."""
+        """Raise a KeyError if a name is not an agent."""
         if agent not in self._action_spaces:
             raise KeyError(unknown_name("agent", agent, self.possible_agents))
 
     def observation_space(self, agent: str) -> Any:
-        """Return the same object at every call."""
+        """Return the observation space of an agent, the same object in every call."""
         self._check_agent(agent)
         return self._observation_spaces[agent]
 
     def action_space(self, agent: str) -> Any:
-        """Return the same object at every call."""
+        """Return the action space of an agent, the same object in every call."""
         self._check_agent(agent)
         return self._action_spaces[agent]
 
@@ -141,12 +153,14 @@ class AirHockeyEnv(CheckedAttributes, EpisodeLength, ParallelEnv[str, Any, Any])
         """Begin an episode; the same seed gives the same episodes.
 
         Args:
-            seed: of this and the following episodes; None goes on with those there are.
-            options: ``{"state": State, "memory": Memory}`` begins at a given state, see
-                `set_state`; the memory may be left out.
+            seed: Seed of this and the following episodes; None continues with the
+                current random streams.
+            options: ``{"state": State, "memory": Memory}`` to begin in a given state,
+                see `set_state`. The memory may be left out.
 
         Raises:
-            ValueError: a misspelt option, or a state that does not fit, named.
+            ValueError: An option is misspelt, or a state is not valid; the message
+                names it.
         """
         observation = reset_world(self.world, seed, options)
         if seed is not None:
@@ -157,27 +171,27 @@ class AirHockeyEnv(CheckedAttributes, EpisodeLength, ParallelEnv[str, Any, Any])
 
     @property
     def physics(self) -> dict[str, float]:
-        """Physical parameters of the episode by name.
+        """Physics parameters of the episode by name.
 
         Raises:
-            RuntimeError: before the first `reset`, which samples them.
+            RuntimeError: `reset`, which samples them, was not called.
         """
         if not self.world.episode.number[0]:
             raise RuntimeError("physics: call reset() first, which samples them")
         return {k: float(v[0]) for k, v in self.world.episode.physics.items()}
 
     def get_state(self) -> tuple[State, Memory]:
-        """Return the true state and the scenario's memory, which `set_state` takes.
+        """Return the true state and the memory, the arguments of `set_state`.
 
-        They have no axis of worlds; freshly allocated.
+        The arrays are new and have no axis of worlds.
         """
         state, memory = self.world.get_state()
         return state.map(lambda x: x[0]), {name: x[0] for name, x in memory.items()}
 
     def set_state(self, state: State, memory: Memory | None = None) -> dict[str, Any]:
-        """Go on from a given state, see `World.set_state`; return the observations.
+        """Continue from a state, see `World.set_state`; return the observations.
 
-        All agents play, even if the episode had ended.
+        All agents are active again, even if the episode had ended.
         """
         observation = self.world.set_state(state, memory)
         self.agents = self.possible_agents[:]
@@ -193,8 +207,9 @@ class AirHockeyEnv(CheckedAttributes, EpisodeLength, ParallelEnv[str, Any, Any])
         """Move by one control step.
 
         Raises:
-            RuntimeError: before a reset, or after the end of the episode.
-            ValueError: a missing or extra agent, or a bad action, named.
+            RuntimeError: `reset` was not called, or the episode has ended.
+            ValueError: An agent is missing or unknown, or an action is not valid; the
+                message names it.
         """
         if not self.agents:
             if not actions and self.world.episode.number[0]:
@@ -218,12 +233,12 @@ class AirHockeyEnv(CheckedAttributes, EpisodeLength, ParallelEnv[str, Any, Any])
         return outcome
 
     def _watch(self) -> None:
-        """Keep the trails, and in human mode the window, up to date."""
+        """Extend the trails of an image, and in human mode show it."""
         if self._renderer is not None:
             self._renderer.follow()
 
     def _array(self, actions: Mapping[str, Any]) -> Array:
-        """Return (1, open, 2) from a dict with an action for each agent and no more."""
+        """Return the actions (1, open, 2) of a dictionary with one for each agent."""
         agents = self.agents
         if not isinstance(actions, Mapping):
             raise ValueError(
@@ -260,23 +275,23 @@ class AirHockeyEnv(CheckedAttributes, EpisodeLength, ParallelEnv[str, Any, Any])
         }
 
     def state(self) -> Array:
-        """Return the true state of everything, see `global_state.GlobalState`.
+        """Return the true state for a critic (S,), see `global_state.GlobalState`.
 
         Raises:
-            RuntimeError: before the first `reset`.
+            RuntimeError: `reset` was not called.
         """
         if not self.world.episode.number[0]:
             raise RuntimeError("state: call reset() first; no episode is running")
         return np.asarray(self.world.critic_state()[0])
 
     def render(self) -> Array | None:
-        """Return a picture (H, W, 3) uint8 for "rgb_array"; None for "human"."""
+        """Return an image (H, W, 3) uint8 for "rgb_array"; None for "human"."""
         if self._renderer is None:
-            raise RuntimeError('render: build it with render_mode="rgb_array"')
+            raise RuntimeError('render: create it with render_mode="rgb_array"')
         return self._renderer.show()
 
     def close(self) -> None:
-        """Close the window and the physics."""
+        """Close the window, the backend and the drivers."""
         if self._renderer is not None:
             self._renderer.close()
         self.world.close()

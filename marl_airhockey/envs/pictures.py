@@ -1,4 +1,4 @@
-"""Pictures of the worlds of a batch, for vector environments."""
+"""Images of the worlds of a batch, for vector environments."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Pictures:
     """Renderers of all worlds of a batch, or none.
 
     Args:
-        world: the worlds; read, not changed.
-        render_mode: None or "rgb_array".
+        world: Worlds of the images, which are not changed.
+        render_mode: "rgb_array", or None for no renderers.
 
     Raises:
-        ValueError: another mode.
+        ValueError: The mode is unknown.
     """
 
     def __init__(self, world: World, render_mode: str | None) -> None:
@@ -38,7 +38,7 @@ class Pictures:
         self._renderers = [Renderer(world, mode, title, index=i) for i in rows]
 
     def follow(self, begun: Iterable[int] = ()) -> None:
-        """Follow a reset or a step, after which some worlds, by index, are new."""
+        """Extend all trails after a reset or a step; clear those of begun worlds."""
         if not self._renderers:
             return
         for i in begun:
@@ -47,11 +47,11 @@ class Pictures:
             renderer.follow()
 
     def take(self) -> list[Array]:
-        """Return a picture (H, W, 3) uint8 of each world.
+        """Return an image (H, W, 3) uint8 of each world.
 
         Raises:
-            RuntimeError: built without a render mode, or before the first reset.
+            RuntimeError: There is no render mode, or `reset` was not called.
         """
         if not self._renderers:
-            raise RuntimeError('render: build it with render_mode="rgb_array"')
+            raise RuntimeError('render: create it with render_mode="rgb_array"')
         return [picture for r in self._renderers if (picture := r.show()) is not None]

@@ -1,7 +1,7 @@
-"""Tell gymnasium of every scenario, when this package is imported.
+"""Registration of every scenario with gymnasium, when this package is imported.
 
-Gymnasium has had no entry points for plugins since 1.0: an id is known after ``import
-marl_airhockey``, or with the module named before it,
+Gymnasium has had no entry points for plugins since 1.0. An id is therefore known after
+``import marl_airhockey``, or with the module in the id, as in
 ``marl_airhockey:marl_airhockey/Juggle-v0``.
 """
 
@@ -13,10 +13,10 @@ from marl_airhockey.discovery import gymnasium_id, names_in
 
 
 def register_all() -> None:
-    """Register ``marl_airhockey/CamelCase-v0`` for every file in ``scenarios/``.
+    """Register an id such as ``marl_airhockey/Juggle-v0`` for every scenario.
 
-    Without a length: ``gymnasium.make`` would end episodes there that keywords make
-    longer. The environments fill in their own, see `episode_length`.
+    The ids have no length, because ``gymnasium.make`` would end episodes there even if
+    a keyword makes them longer. The environments fill it in, see `episode_length`.
     """
     for name in names_in("scenarios"):
         register(

@@ -15,49 +15,50 @@ from marl_airhockey.sim.world.world import World
 
 OPTIONS = ("state", "memory")
 MASK = "reset_mask"
-"""Further option of `reset` of a vector environment"""
+"""Additional option of `reset` of a vector environment."""
 
 
 def check_options(world: World, options: Any, known: Sequence[str] = OPTIONS) -> None:
-    """Refuse a misspelt option, a scenario's field, and a memory without its state.
+    """Check the options of a reset.
 
-    Other options pass unheeded, as conformance tests send some.
+    Other unknown options are ignored, because conformance tests send some.
 
     Args:
         world: Worlds that are reset.
-        options: Options that were given.
-        known: Names of the options that exist.
+        options: Options of the reset.
+        known: Names of the known options.
 
     Raises:
-        ValueError: One of these, named, or options that are no dict.
+        ValueError: The options are not a dict, or one of them is misspelt, a field of
+            the scenario, or a memory without a state. The message names it.
     """
     if not isinstance(options, Mapping):
-        raise ValueError(f"reset options: {options!r} is no dict")
+        raise ValueError(f"reset options: {options!r}; expected a dict")
     own = [field.name for field in fields(world.scenario)]
     for name in options.keys() - {*known}:
         if name in own:
             raise ValueError(
                 f"reset options: {name!r} is a field of {world.scenario.name}; set it "
-                f'where the environment is built, options={{"{name}": ...}}'
+                f'when the environment is created, options={{"{name}": ...}}'
             )
         if get_close_matches(name, known):
             raise ValueError(unknown_name("reset option", name, known))
     if "memory" in options and "state" not in options:
-        raise ValueError("reset options: a memory needs its state")
+        raise ValueError("reset options: a memory needs a state; give both")
 
 
 def reset_world(
     world: World, seed: int | Sequence[int] | None, options: dict[str, Any] | None
 ) -> Observation:
-    """Reset worlds, to given states if the options hold them.
+    """Reset worlds, to given states if the options contain them.
 
     Args:
-        world: Worlds.
-        seed: See `World.reset`.
-        options: ``state`` and ``memory`` of `World.set_state`, both optional.
+        world: Worlds to reset.
+        seed: Seed as in `World.reset`.
+        options: Arguments ``state`` and ``memory`` of `World.set_state`, both optional.
 
     Raises:
-        ValueError: A bad option, see `check_options`, or a state that does not fit.
+        ValueError: An option is not valid, see `check_options`, or a state is not.
     """
     given = {} if options is None else options
     check_options(world, given)
@@ -70,7 +71,7 @@ def reset_world(
 def reset_each(
     world: World, seed: Sequence[int] | None, options: Sequence[Mapping[str, Any]]
 ) -> Observation:
-    """Reset worlds with options for each, see `reset_world`."""
+    """Reset worlds, each with options of its own, see `reset_world`."""
     for given in options:
         check_options(world, given)
     observation = world.reset(seed)

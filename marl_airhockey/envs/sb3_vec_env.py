@@ -1,4 +1,4 @@
-"""Stable-baselines3 VecEnv over B worlds: a slot for each open seat of each."""
+"""Stable-baselines3 VecEnv of B worlds with a slot for each open seat."""
 
 from __future__ import annotations
 
@@ -20,14 +20,29 @@ from marl_airhockey.types import Array, Memory
 
 
 class AirHockeyVecEnv(VecEnv):
-    """Slots as an environment of stable-baselines3, see `SlotEnv`.
+    """Stable-baselines3 VecEnv with a slot for each open seat of B worlds.
 
-    It does what a ``DummyVecEnv`` of as many single environments does, each in a
-    ``Monitor``. `get_attr`, `set_attr` and `env_method` reach what `Slot` has.
+    It returns the same as a ``DummyVecEnv`` of one single environment per slot, each in
+    a ``Monitor``. The slots of a world follow each other.
+
+    - Observations: float32 array (slots, D), SI units, ego frames. They are uint8
+      images with observe="pixels" and dictionaries with goals="dict".
+    - Actions: target velocities (slots, 2), divided by the top speed, -1 to 1, ego
+      frames.
+    - Rewards: sums (slots,) of the reward terms; with goals="dict", 1 if the goal is
+      met, else 0.
+    - Ends (slots,) bool: the episode was terminated or truncated. The world restarts in
+      the same step.
+    - Termination: the episode ended by the rules of the scenario.
+    - Truncation: `max_cycles` steps have passed. ``TimeLimit.truncated`` in the info is
+      then True.
+    - Infos: a dictionary for each slot, see `SlotEnv`.
+
+    `get_attr`, `set_attr` and `env_method` access the attributes and methods of `Slot`.
 
     Args:
         slots: Worlds and their slots.
-        render_mode: None or "rgb_array": pictures of all worlds, tiled.
+        render_mode: "rgb_array" for one image with tiles of all worlds, or None.
     """
 
     def __init__(self, slots: SlotEnv, render_mode: str | None = None) -> None:
@@ -50,10 +65,14 @@ class AirHockeyVecEnv(VecEnv):
         return self.world.observer.labels
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Give world i the seed + i at the next reset; return the slots' seeds.
+        """Set the seed of world i to seed + i for the next reset.
 
         Args:
-            seed: Seed of the first world; None draws one from numpy's global generator.
+            seed: Seed of the first world; None samples one from NumPy's global
+                generator.
+
+        Returns:
+            Seed of the world of each slot (slots,).
         """
         first = super().seed(seed)[0]
         assert first is not None
@@ -64,8 +83,8 @@ class AirHockeyVecEnv(VecEnv):
         """Begin an episode in every world, with the seeds and options that are set.
 
         Raises:
-            ValueError: Slots of one world have different options; or a bad option, see
-                `AirHockeyEnv.reset`.
+            ValueError: Slots of one world have different options, or an option is not
+                valid, see `AirHockeyEnv.reset`.
         """
         given = self._seeds[0] is not None
         seeds = [s for s in self._of_worlds(self._seeds) if s is not None]
@@ -77,38 +96,39 @@ class AirHockeyVecEnv(VecEnv):
         return observation
 
     def _of_worlds(self, every: Sequence[Any]) -> list[Any]:
-        """Return what each world is given, of what each slot is given."""
+        """Return the value for each world, from one value for each slot."""
         if len(every) != self.num_envs:
-            raise ValueError(f"options: {len(every)} for {self.num_envs} slots")
+            raise ValueError(f"options: {len(every)} given for {self.num_envs} slots")
         worlds: dict[int, Any] = {}
         for i, given in enumerate(every):
             first = worlds.setdefault(self.slots.world_of(i), given)
             if first is not given and repr(first) != repr(given):
-                raise ValueError("options: slots of one world need the same ones")
+                raise ValueError("options: slots of one world need equal options")
         return [worlds[world] for world in range(self.world.num_worlds)]
 
     def set_options(
         self, options: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None
     ) -> None:
-        """Set options of the next reset, one for all slots or a list with one for each.
+        """Set the options of the next reset.
 
         Args:
-            options: See `AirHockeyEnv.reset`.
+            options: Options for all slots, or a list with options for each slot, see
+                `AirHockeyEnv.reset`.
         """
         super().set_options(options)  # type: ignore[arg-type]
 
     def get_state(self) -> tuple[State, Memory]:
-        """Return the true states and the memories of all worlds, (B, ...)."""
+        """Return the true states and the memories of all worlds (B, ...)."""
         return self.world.get_state()
 
     def set_state(
         self, state: State, memory: Memory | None = None, worlds: Array | None = None
     ) -> Any:
-        """Continue from given states, see `World.set_state`; return observations."""
+        """Continue from states, see `World.set_state`; return the observations."""
         return self.slots.set_state(state, memory, worlds)
 
     def step_async(self, actions: Array) -> None:
-        """Take the actions (slots, 2)."""
+        """Store the actions (slots, 2) of the next step."""
         self._actions = actions
 
     def step_wait(self) -> Any:
@@ -118,23 +138,24 @@ class AirHockeyVecEnv(VecEnv):
         return result
 
     def compute_reward(self, achieved: Array, desired: Array, info: Any) -> Array:
-        """(...) float32: 1 where the goal is met; for goals="dict"."""
+        """Return the rewards of goals (..., G) with goals="dict" (...), float32."""
         scenario = self.world.scenario
         assert isinstance(scenario, GoalScenario)
         return np.asarray(scenario.shown_reward(achieved, desired), np.float32)
 
     def get_images(self) -> Sequence[Array | None]:
-        """Return a picture (H, W, 3) uint8 of the world of each slot; or None each."""
+        """Return an image (H, W, 3) uint8 of each slot's world, or None for each."""
         if self.render_mode is None:
             warnings.warn(
-                'The render mode is None; build with "rgb_array"', stacklevel=2
+                'render_mode is None; create it with "rgb_array"',
+                stacklevel=2,
             )
             return [None] * self.num_envs
         pictures = self._pictures.take()
         return [pictures[self.slots.world_of(i)] for i in range(self.num_envs)]
 
     def close(self) -> None:
-        """Close the physics."""
+        """Close the backend and the drivers."""
         self.slots.close()
 
     def _chosen(self, indices: Any) -> list[Slot]:
@@ -159,5 +180,5 @@ class AirHockeyVecEnv(VecEnv):
         return [getattr(slot, method_name)(*args, **kwargs) for slot in chosen]
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Return True for ``Monitor``, whose ``episode`` all infos have; else False."""
+        """Return True for ``Monitor``, because infos contain its ``episode``."""
         return [wrapper_class is Monitor for _ in self._get_indices(indices)]

@@ -1,4 +1,4 @@
-"""Slot: one of many environments that share their worlds, as if it were alone."""
+"""Slot: one environment of an `AirHockeyVecEnv`."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 
 class Slot(CheckedAttributes):
-    """Attributes and methods of the single environment that a slot stands for.
+    """Single environment of one slot, with attributes and methods but without steps.
 
-    They are those of `AirHockeySingleEnv` but for `reset` and `step`, which move all
-    slots. What learning libraries store in it is kept.
+    It has the attributes and methods of `AirHockeySingleEnv` except `reset` and `step`,
+    which move all slots. Learning libraries can store further attributes in it.
 
     Args:
         venv: Environment of all slots.
@@ -45,7 +45,7 @@ class Slot(CheckedAttributes):
 
     @property
     def physics(self) -> dict[str, float]:
-        """Physical parameters of the episode by name."""
+        """Physics parameters of the episode by name."""
         physics = self.world.episode.physics
         return {name: float(x[self._rows[0]]) for name, x in physics.items()}
 
@@ -65,16 +65,16 @@ class Slot(CheckedAttributes):
         return state.map(lambda x: x[i]), {name: x[i] for name, x in memory.items()}
 
     def set_state(self, state: State, memory: Memory | None = None) -> Any:
-        """Continue from a given state, see `World.set_state`; return what is seen."""
+        """Continue from a state, see `World.set_state`; return the observation."""
         seen = self._venv.set_state(state, memory, self._rows)
         if isinstance(seen, dict):
             return {name: value[self._index] for name, value in seen.items()}
         return seen[self._index]
 
     def compute_reward(self, achieved: Array, desired: Array, info: Any) -> Array:
-        """(...) float32: 1 where the goal is met; for goals="dict"."""
+        """Return the rewards of goals (..., G) with goals="dict" (...), float32."""
         return self._venv.compute_reward(achieved, desired, info)
 
     def render(self) -> Array | None:
-        """Return a picture (H, W, 3) uint8 of the slot's world."""
+        """Return an image (H, W, 3) uint8 of the slot's world."""
         return self._venv.get_images()[self._index]

@@ -1,4 +1,4 @@
-"""Slots: B worlds as one vector environment with a slot for each open seat of each."""
+"""Vector environment of B worlds with a slot for each open seat."""
 
 from __future__ import annotations
 
@@ -23,16 +23,20 @@ from marl_airhockey.types import Array, Memory
 class SlotEnv:
     """Vector environment of B x open seats, world by world, for one shared policy.
 
-    It has what learners need and depends on no learning library; `AirHockeyVecEnv` is
-    the same for stable-baselines3. Episodes restart immediately. Slots whose episode
-    ended get ``terminal_observation``, ``is_success``, ``first_shot`` and ``episode``
-    in their infos; ``TimeLimit.truncated`` is in all. Each info is a dict of its own.
+    It has the API that learners need and depends on no learning library.
+    `AirHockeyVecEnv` is the same for stable-baselines3. Episodes restart immediately.
+    Every info is a separate dict with ``TimeLimit.truncated``. At the end of an episode
+    it also has ``terminal_observation``, ``is_success``, ``first_shot`` and
+    ``episode``.
 
     Args:
-        scenario: Name of the scenario, or a scenario object.
+        scenario: Name, code, class or object, see `registry.find_scenario`.
         num_worlds: Number of worlds, B.
-        forms: See `build.build_world`.
-        **keywords: See `build.build_world`.
+        forms: Observation types of drivers that take open seats later.
+        **keywords: Shared keywords, see `make.parallel_env`.
+
+    Raises:
+        ValueError: Every seat has a driver.
     """
 
     def __init__(
@@ -52,8 +56,9 @@ class SlotEnv:
         self.last_terms: dict[str, float] = {}
         """Mean reward terms of the last step, by name."""
         self.penalty: Callable[[Array, Array, Array], Array] | None = None
-        """Penalty (slots,) of actions (slots, 2), excess of limits (slots,) and ends of
-        episodes (slots,), which is subtracted from the rewards; None for none."""
+        """Function that returns the penalty (slots,), which is subtracted from the
+        rewards, for actions (slots, 2), excess over the limits (slots,) and ends of
+        episodes (slots,); None for no penalty."""
         self.ended = np.zeros(0, np.int64)
         """Indices of the worlds that restarted in the last step."""
         self._began = time.time()
@@ -62,11 +67,11 @@ class SlotEnv:
 
     @property
     def unwrapped(self) -> SlotEnv:
-        """The environment itself, as gymnasium's environments have it."""
+        """The environment itself, as in gymnasium."""
         return self
 
     def seed(self, seed: int) -> None:
-        """Give world i the seed + i at the next reset."""
+        """Set the seed of world i to seed + i for the next reset."""
         self.world.seed(seed)
 
     def reset(
@@ -77,7 +82,7 @@ class SlotEnv:
         """Begin an episode in every world; return the observations (slots, ...).
 
         Args:
-            seed: Seed of each world; None continues with those there are.
+            seed: Seed of each world; None continues with the current random streams.
             options: Options of each world, see `reset_options.reset_world`.
         """
         self._returns[:], self._lengths[:] = 0.0, 0
@@ -88,21 +93,21 @@ class SlotEnv:
     def set_state(
         self, state: State, memory: Memory | None = None, worlds: Array | None = None
     ) -> Any:
-        """Continue from given states, see `World.set_state`; return observations."""
+        """Continue from states, see `World.set_state`; return the observations."""
         return self.of_slots(self.world.set_state(state, memory, worlds))
 
     def step(self, actions: Array) -> tuple[Any, Array, Array, list[dict[str, Any]]]:
         """Move all worlds by one control step.
 
         Args:
-            actions: Actions (slots, 2), fractions of top speed, ego frames.
+            actions: Target velocities (slots, 2), divided by the top speed, ego frames.
 
         Returns:
             Observations (slots, ...), rewards (slots,) float32, ends of episodes
             (slots,) bool, and an info for each slot.
 
         Raises:
-            ValueError: A wrong shape, or an element that is not finite.
+            ValueError: The shape is wrong, or an element is not finite.
         """
         given, shape = np.asarray(actions), (self.num_envs, 2)
         if given.shape != shape:
@@ -151,21 +156,21 @@ class SlotEnv:
             }
 
     def of_slots(self, observation: Observation) -> Any:
-        """Return the observations (slots, ...) of (B, seats, ...)."""
+        """Reshape observations (B, seats, ...) to (slots, ...)."""
         if isinstance(observation, np.ndarray):
             return self._pick(observation)
         return {k: self._pick(v) for k, v in observation.items()}
 
     def _of_worlds(self, actions: Array) -> Array:
-        """Return the actions (B, seats, 2) of those of slots (slots, 2)."""
+        """Reshape actions (slots, 2) to (B, seats, 2)."""
         return actions.reshape(-1, self.seats, 2)
 
     def _pick(self, rows: Array) -> Array:
-        """Return the rows (slots, ...) of (B, seats, ...)."""
+        """Reshape rows (B, seats, ...) to (slots, ...)."""
         return rows.reshape(self.num_envs, *rows.shape[2:])
 
     def _done(self, ended: Array) -> Array:
-        """Return (slots,) of (B,)."""
+        """Return the ends of slots (slots,), given the ends of worlds (B,)."""
         return np.repeat(ended, self.seats)
 
     def world_of(self, slot: int) -> int:
@@ -173,15 +178,15 @@ class SlotEnv:
         return slot // self.seats
 
     def _all_began(self) -> None:
-        """Take note that an episode begins in every world."""
+        """Do nothing; called when an episode begins in every world."""
         return None
 
     def _restarted(self, worlds: Array, last: StepResult) -> None:
-        """Take note that some worlds, by index, restarted after their last step."""
+        """Do nothing; called when some worlds, by index, restarted after a step."""
         return None
 
     def close(self) -> None:
-        """Close the physics."""
+        """Close the backend and the drivers."""
         self.world.close()
 
 

@@ -1,4 +1,4 @@
-"""TorchRL EnvBase over B worlds, with a group of agents for each team."""
+"""TorchRL EnvBase of B worlds with a group of agents for each team."""
 
 from __future__ import annotations
 
@@ -20,23 +20,34 @@ from marl_airhockey.types import Array
 
 
 class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
-    """B worlds as one environment of batch size (B,), as TorchRL and BenchMARL take it.
+    """TorchRL EnvBase of B worlds, with batch size (B,), also for BenchMARL.
 
-    The open seats of team k are the group ``team_k`` of n agents, with the keys
-    ``(team_k, "observation")`` (B, n, D), ``(team_k, "action")`` (B, n, 2) and
-    ``(team_k, "reward")`` (B, n, 1), all float32. Beside the groups are ``state``
-    (B, S), what a central critic may know, see `global_state.GlobalState`, and
-    ``done``, ``terminated`` and ``truncated`` (B, 1). Worlds that
-    ended wait for a reset by ``_reset``, as collectors and rollouts give it.
+    The open seats of team k are the group ``team_k`` of n agents. Tensors of a group
+    are float32:
+
+    - Observation ``(team_k, "observation")`` (B, n, D): SI units, ego frames.
+    - Action ``(team_k, "action")`` (B, n, 2): target velocities, divided by the top
+      speed, -1 to 1, ego frames.
+    - Reward ``(team_k, "reward")`` (B, n, 1): sum of the reward terms.
+
+    Each world has these tensors:
+
+    - ``state`` (B, S): true state for a central critic, see `global_state.GlobalState`.
+    - ``terminated`` (B, 1): the episode ended by the rules of the scenario.
+    - ``truncated`` (B, 1): the number of steps reached the limit of the episode.
+    - ``done`` (B, 1): the episode was terminated or truncated.
+
+    Worlds that ended are reset by the key ``_reset``, which collectors and rollouts
+    set.
 
     Args:
-        scenario: its name, or a scenario object.
-        num_worlds: B.
-        device: of the tensors; physics stays on the CPU.
-        **keywords: see `make.build_world`.
+        scenario: Name, code, class or object, see `registry.find_scenario`.
+        num_worlds: Number of worlds, B.
+        device: Device of the tensors. The physics is computed on the CPU.
+        **keywords: Shared keywords, see `make.parallel_env`.
 
     Raises:
-        ValueError: observations are not flat numbers (pictures, goals as dicts).
+        ValueError: Observations are images or dictionaries.
     """
 
     batch_locked = True
@@ -67,8 +78,8 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
         own = observation_space(self.world.observer)
         if not isinstance(own, spaces.Box) or len(own.shape) != 1:
             raise ValueError(
-                f"observations: TorchRL's environment shows flat numbers, not {own}; "
-                'take another observe=, and goals="flat"'
+                f"observations: TorchRL needs flat numbers, got {own}; "
+                'choose another observe= and goals="flat"'
             )
         batch, device = tuple(self.batch_size), self.device
         whole = self.world.critic_state_space
@@ -137,7 +148,7 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
     def _tensors(
         self, observation: Observation, terminated: Array, truncated: Array
     ) -> TensorDict:
-        """Return what a reset and a step both give."""
+        """Return the entries that a reset and a step have in common."""
         batch, seen = self.batch_size, self._tensor(observation)
         ended, out_of_time = (
             torch.as_tensor(flag.copy(), device=self.device)[:, None]
@@ -159,6 +170,6 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
         return torch.as_tensor(array, dtype=torch.float32, device=self.device)
 
     def close(self, *, raise_if_closed: bool = True) -> None:
-        """Close the physics."""
+        """Close the backend and the drivers."""
         super().close(raise_if_closed=raise_if_closed)
         self.world.close()

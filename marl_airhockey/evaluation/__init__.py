@@ -1,1 +1,1 @@
-"""Evaluation: episodes, games, leagues, speed, statistics."""
+"""Evaluation of drivers: episodes, games, leagues, speed and statistics."""

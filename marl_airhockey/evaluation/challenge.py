@@ -1,7 +1,8 @@
-"""Challenge: one fixed protocol by which players of anybody are compared.
+"""Challenge: a fixed protocol that makes results of different authors comparable.
 
-The ten tasks in three profiles, whose physics are drawn anew for each episode, and
-duels against a fixed field. What is not played counts as 0.
+It has the ten tasks in three profiles and duels against a fixed set of opponents. The
+physics parameters of the tasks are sampled for each episode. A part of the protocol
+that was not played has the score 0.
 """
 
 from __future__ import annotations
@@ -31,24 +32,27 @@ TASKS = (
 )
 PROFILES = ("ideal", "ur5e", "gantry")
 FIELD = ("random", "goalkeeper", "striker", "allround", "zoo/duel")
-"""Opponents of the duels"""
+"""Opponents of the duels."""
 EPISODES, GAMES = 200, 100
-"""Episodes of each task in each profile, and games against each opponent"""
+"""Number of episodes of each task in each profile, and of games against each
+opponent."""
 SEED = 6_000_000
-"""Seed of the first episode and of the first game
+"""Seed of the first episode and of the first game.
 
-Whoever changes anything above raises `challenge_report.PROTOCOL`."""
+If a constant above is changed, `challenge_report.PROTOCOL` has to be increased.
+"""
 
 
 def find_player(given: str, scenario: str, profile: str) -> str:
-    """Return who plays a scenario in a profile; "" for nobody.
+    """Return the driver that plays a scenario in a profile; "" if there is none.
 
     Args:
-        given: a driver's name or a policy's path, who plays all that it can; or "zoo",
-            or a folder of policies by name, of which ``<scenario>_<profile>`` comes
-            before ``<scenario>``: files or run folders.
-        scenario: name of the scenario.
-        profile: name of the profile.
+        given: Name of a driver or path of a policy, which then plays everything. Or
+            "zoo", or a folder of policies (files or run folders) whose names are
+            ``<scenario>_<profile>`` or ``<scenario>``. The first of the two names is
+            preferred.
+        scenario: Name of the scenario.
+        profile: Name of the profile.
     """
     folder = ZOO if given == "zoo" else Path(given)
     if not folder.is_dir() or (folder / "config.toml").exists():
@@ -72,15 +76,16 @@ def play_challenge(
     """Play the protocol.
 
     Args:
-        given: see `find_player`.
-        name: name of the card.
-        version: of the library.
-        episodes: of each task and profile; fewer give no card to compare.
-        games: of each duel.
-        report: called after each result.
+        given: Driver, policy or folder of policies, see `find_player`.
+        name: Name of the card.
+        version: Version of the library.
+        episodes: Number of episodes of each task and profile. Cards with fewer episodes
+            than the protocol requires are not comparable.
+        games: Number of games of each duel.
+        report: Function that is called after each result.
 
     Raises:
-        ValueError: nothing at all could be played.
+        ValueError: No part of the protocol could be played.
     """
     results, files = [], {}
     cells = [(t, p, "") for p in PROFILES for t in TASKS]
@@ -94,14 +99,16 @@ def play_challenge(
         results.append(result)
         report(result)
     if not any(result.player for result in results):
-        raise ValueError(f"{given}: it plays none of it; {results[0].note}")
+        raise ValueError(
+            f"{given}: plays no part of the challenge; first reason: {results[0].note}"
+        )
     return ChallengeReport(name, version, episodes, games, files, tuple(results))
 
 
 def _play(
     scenario: str, profile: str, opponent: str, player: str, episodes: int, games: int
 ) -> ChallengeResult:
-    """Play one task in one profile, or one opponent."""
+    """Play one task in one profile, or the duel against one opponent."""
 
     def missing(note: str) -> ChallengeResult:
         return ChallengeResult(

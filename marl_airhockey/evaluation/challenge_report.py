@@ -1,4 +1,4 @@
-"""Report of a challenge: a player's results, as JSON, Markdown and a picture."""
+"""Report of a challenge: the results of a player as JSON, Markdown and a plot."""
 
 from __future__ import annotations
 
@@ -11,45 +11,46 @@ from pathlib import Path
 import numpy as np
 
 PROTOCOL = 2
-"""Raised whenever the challenge changes: cards of others are not comparable"""
+"""Number of the protocol. It is increased whenever the challenge changes, because cards
+of different protocols are not comparable."""
 
 
 @dataclass(frozen=True)
 class ChallengeResult:
-    """Result in one task and profile, or against one opponent."""
+    """Result of one task in one profile, or of the duel against one opponent."""
 
     scenario: str
     profile: str
     opponent: str
-    """Opponent; "" in a task"""
+    """Opponent; "" in a task."""
     player: str
-    """Who played; "" if nobody did"""
+    """File or name of the driver that played; "" if this part was not played."""
     score: float
-    """Success; of a duel the share of won games, a draw being half"""
+    """Success of a task, or share of won games of a duel, where a draw counts half."""
     low: float
     high: float
-    """95 % interval of the score"""
+    """Ends of the 95 % interval of the score."""
     first_shot: float
-    """Share of episodes that succeeded before a second distinct touch; 0 in duels"""
+    """Share of episodes that succeeded before a second distinct touch; 0 in duels."""
     deployability: str
-    """Grade A to D of a task; "" in duels"""
+    """Class A to D of a task, see `Deployability`; "" in duels."""
     note: str
-    """Why it was not played"""
+    """Reason why this part was not played; "" if it was played."""
 
 
 @dataclass(frozen=True)
 class ChallengeReport:
-    """Results of a player in all of the protocol."""
+    """Results of a player in all parts of the protocol."""
 
     name: str
     version: str
-    """Version of the library"""
+    """Version of the library."""
     episodes: int
-    """Number of episodes of each task and profile"""
+    """Number of episodes of each task and profile."""
     games: int
-    """Number of games against each opponent"""
+    """Number of games against each opponent."""
     files: dict[str, str]
-    """SHA-256 of the policies' files, by name"""
+    """SHA-256 of the policy files, by name."""
     results: tuple[ChallengeResult, ...]
     protocol: int = PROTOCOL
 
@@ -63,7 +64,8 @@ class ChallengeReport:
     ) -> tuple[float, float, float]:
         """Return the mean score of some results, and its 95 % interval.
 
-        The interval adds those of the results as independent errors.
+        The interval combines those of the results as independent errors. Parts that
+        were not played count as exactly 0.
         """
         kept = [result for result in self.results if keep(result)]
         mean = float(np.mean([result.score for result in kept]))
@@ -73,7 +75,7 @@ class ChallengeReport:
 
     @property
     def totals(self) -> dict[str, tuple[float, float, float]]:
-        """Means with intervals: of each profile's tasks, all tasks, and duels."""
+        """Mean scores with intervals: each profile, all tasks, and all duels."""
         found = {}
         for profile in self.profiles:
             in_it = partial(_is_task, profile=profile)
@@ -90,10 +92,10 @@ class ChallengeReport:
 
     @staticmethod
     def from_json(text: str) -> ChallengeReport:
-        """Read what `to_json` wrote.
+        """Read a card that `to_json` wrote.
 
         Raises:
-            ValueError: no card, or one of another protocol.
+            ValueError: The text is not a card, or it is a card of another protocol.
         """
         try:
             data = json.loads(text)
@@ -101,10 +103,11 @@ class ChallengeReport:
             data["results"] = tuple(ChallengeResult(**row) for row in data["results"])
             card = ChallengeReport(**data)
         except (KeyError, TypeError, json.JSONDecodeError) as error:
-            raise ValueError(f"this is no card of a challenge: {error}") from error
+            raise ValueError(f"not a card of a challenge: {error}") from error
         if card.protocol != PROTOCOL:
             raise ValueError(
-                f"a card of protocol {card.protocol}, this is {PROTOCOL}: play anew"
+                f"card of protocol {card.protocol}, expected {PROTOCOL}: play the "
+                "challenge again"
             )
         return card
 
@@ -140,7 +143,7 @@ class ChallengeReport:
         return "\n".join(lines) + "\n"
 
     def save(self, folder: Path) -> list[Path]:
-        """Write card.json, card.md and card.png; return them."""
+        """Write card.json, card.md and card.png, and return their paths."""
         folder.mkdir(parents=True, exist_ok=True)
         files = [folder / f"card.{kind}" for kind in ("json", "md", "png")]
         files[0].write_text(self.to_json())
@@ -158,7 +161,7 @@ def _share(result: ChallengeResult) -> str:
 
 
 def plot_card(card: ChallengeReport, path: Path) -> None:
-    """Draw the success in each task, a line for each profile, as a radar plot."""
+    """Plot the success in each task as a radar chart with a line for each profile."""
     import matplotlib.pyplot as plt
 
     from marl_airhockey.sim.render.charts import DPI, INK, INKS, save

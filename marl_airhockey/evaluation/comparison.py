@@ -14,7 +14,7 @@ from marl_airhockey.types import Array
 
 Interval = tuple[float, float]
 RESAMPLES = 4000
-"""Resamples of a bootstrap"""
+"""Number of resamples of a bootstrap."""
 
 
 @dataclass(frozen=True)
@@ -22,13 +22,13 @@ class Outcomes:
     """Outcomes of n trials of one method."""
 
     policy: Array
-    """(n,) index of the policy that played, among those of the method"""
+    """Index of the policy of each trial, among the policies of the method, (n,)."""
     success: Array
-    """(n,) 1 or 0"""
+    """1 for a success, else 0, (n,)."""
     returns: Array
-    """(n,)"""
+    """Returns of the trials, (n,)."""
     interrupted: Array
-    """(n,) 1 where a real table ended the trial"""
+    """1 where a real table ended the trial early, else 0, (n,)."""
 
 
 @dataclass(frozen=True)
@@ -37,16 +37,16 @@ class Estimates:
 
     success: float
     success_interval: Interval
-    """Over policies and their trials, and no narrower than by the trials alone:
-    Wilson's of a method, Newcombe's (1998) of a difference"""
+    """Interval of the success over policies and their trials. It contains the interval
+    of the trials alone: Wilson's for a method, Newcombe's (1998) for a difference."""
     returns: float
     returns_interval: Interval
-    """Over policies and their trials"""
+    """Interval of the mean return over policies and their trials."""
 
 
 @dataclass(frozen=True)
 class MethodResult(Estimates):
-    """Result of a method in all of its trials."""
+    """Result of all trials of a method."""
 
     name: str
     trials: int
@@ -75,15 +75,16 @@ class Comparison:
 
 
 def compare(methods: Mapping[str, Outcomes], seed: int = 0) -> Comparison:
-    """Compare methods by their trials, without regard to which start was whose.
+    """Compare methods by their trials; trials are not paired by their start.
 
-    Intervals are percentiles of a bootstrap in two stages: policies of a method with
-    replacement, then trials of each. What one policy's training had of luck is part of
-    them as soon as a method has several.
+    Intervals are percentiles of a bootstrap in two stages. First the policies of a
+    method are resampled with replacement, then the trials of each policy. If a method
+    has several policies, the intervals therefore include the random variation between
+    trainings.
 
     Args:
-        methods: outcomes by name, one at least of each.
-        seed: of the resampling.
+        methods: Outcomes by name of the method, with at least one trial of each.
+        seed: Seed of the resampling.
     """
     rng = np.random.default_rng(seed)
     draws = {name: _resample(trials, rng) for name, trials in methods.items()}
@@ -131,7 +132,7 @@ def _result(name: str, trials: Outcomes, draws: Array) -> MethodResult:
 
 
 def _newcombe(a: MethodResult, b: MethodResult) -> Interval:
-    """Return the interval of a difference of shares, by those of both."""
+    """Return the interval of a difference of shares from the intervals of both."""
     (low_a, high_a), (low_b, high_b) = (interval(x.success, x.trials) for x in (a, b))
     gap = a.success - b.success
     below = np.hypot(a.success - low_a, high_b - b.success)
@@ -140,7 +141,10 @@ def _newcombe(a: MethodResult, b: MethodResult) -> Interval:
 
 
 def _wider(drawn: Interval, counted: Interval) -> Interval:
-    """Return what holds both: resamples of trials that all succeed do not differ."""
+    """Return the smallest interval that contains both.
+
+    The bootstrap gives an interval of width 0 if all trials succeed.
+    """
     return min(drawn[0], counted[0]), max(drawn[1], counted[1])
 
 

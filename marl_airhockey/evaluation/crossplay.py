@@ -1,4 +1,4 @@
-"""Cross-play: how well players do with teammates that they were not trained with."""
+"""Cross-play: evaluation of players with teammates that they were not trained with."""
 
 from __future__ import annotations
 
@@ -20,19 +20,18 @@ from marl_airhockey.types import Array
 class CrossPlay:
     """Results of E players in teams.
 
-    The row's player is at ``paddle_0``, the column's are its teammates.
-
-    On the diagonal a player meets itself (self-play).
+    The player of the row is at ``paddle_0``. The player of the column is at the other
+    seats of the team. The diagonal contains teams of a player with itself (self-play).
     """
 
     scenario: str
     names: tuple[str, ...]
     episodes: int
-    """Number of episodes of each pair"""
+    """Number of episodes of each pair."""
     returns: Array
-    """(E, E) mean return"""
+    """Mean return, (E, E)."""
     success: Array
-    """(E, E) share of episodes with success"""
+    """Share of episodes with success, (E, E)."""
 
     @property
     def self_play(self) -> float:
@@ -46,9 +45,9 @@ class CrossPlay:
 
     @property
     def gaps(self) -> Array:
-        """(E,) what each player's return loses with others, in both roles.
+        """Loss of return of each player when it plays with others, in both roles, (E,).
 
-        Their mean is the zero-shot coordination gap (Hu and others, 2020).
+        The mean is the zero-shot coordination gap (Hu and others, 2020).
         """
         count = len(self.names)
         own = np.diag(self.returns)
@@ -85,22 +84,26 @@ def crossplay(
     report: Callable[[int], None] = lambda pairs: None,
     **keywords: Unpack[Keywords],
 ) -> CrossPlay:
-    """Let every player play with every other as its teammate, and with itself.
+    """Let every player play with every other one as its teammate, and with itself.
 
-    What is not given is that of the policies' training, which must agree.
+    Keywords that are not given are those of the training of the policies, which must
+    agree.
 
     Args:
         scenario: Name of a game whose first team has two seats or more.
-        players: Players by name, see `registry.make_driver`, two at least; or their
-            names alone.
-        episodes: Number of episodes of each pair, with the same seeds for all.
-        seed: Seed of the first one.
-        exact: Whether keywords that are not given have their defaults instead.
-        report: Function that is called after each pair with their number so far.
-        **keywords: Keywords of the environment; its drivers fill other teams' seats.
+        players: Two or more players by name, see `registry.make_driver`; or a sequence
+            of names of drivers.
+        episodes: Number of episodes of each pair. All pairs have the same seeds.
+        seed: Seed of the first episode.
+        exact: True to use the defaults for keywords that are not given.
+        report: Function that is called after each pair with the number of finished
+            pairs.
+        **keywords: Keywords of the environment; ``drivers`` are those of the other
+            teams.
 
     Raises:
-        ValueError: A single player, a team of one, or a seat without a driver.
+        ValueError: There is only one player, the first team has one seat, or a seat has
+            no driver.
     """
     drivers, keywords = seated_players(players, scenario, keywords, exact)
     if len(drivers) < 2:

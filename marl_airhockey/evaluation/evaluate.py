@@ -1,4 +1,4 @@
-"""Evaluation of a driver in a scenario, over many episodes at once."""
+"""Evaluation of a driver in a scenario, over many episodes in one batch."""
 
 from __future__ import annotations
 
@@ -28,9 +28,10 @@ from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.sim.world.world import World
 
 TEST_SEED = 2_000_000
-"""First of the seeds that training never sees"""
+"""First seed that training never uses."""
 MOST_STEPS = 1 << 21
-"""Most control steps whose columns are in memory together, about 400 MB in a duel"""
+"""Largest number of control steps whose columns are in memory together, about 400 MB in
+a duel."""
 
 
 @dataclass(frozen=True)
@@ -44,36 +45,39 @@ class EvaluationResult:
     episodes: int
     success: float
     success_interval: tuple[float, float]
-    """95 % interval of the success, Wilson's"""
+    """95 % interval of the success (Wilson)."""
     first_shot: float
-    """Share of episodes that succeeded before a second distinct touch"""
+    """Share of episodes that succeeded before a second distinct touch."""
     returns: float
-    """Mean return"""
+    """Mean return."""
     returns_iqm: float
-    """Interquartile mean of the returns, robust against a few odd episodes"""
+    """Interquartile mean of the returns, on which single outliers have little
+    effect."""
     returns_interval: tuple[float, float]
-    """95 % interval of the interquartile mean, by bootstrap"""
+    """95 % interval of the interquartile mean, by bootstrap."""
     length: float
-    """Mean length of an episode, control steps"""
+    """Mean length of an episode, control steps."""
     hits: float
-    """Mean number of distinct touches in an episode"""
+    """Mean number of distinct touches in an episode."""
     deployability: Deployability
     interrupted: int = 0
-    """Number of episodes that a real table had to end; they are no success"""
+    """Number of episodes that a real table ended early; they do not count as a
+    success."""
     interruptions: dict[str, int] = field(default_factory=dict)
-    """Reasons of these, and how many episodes each of them ended"""
+    """Number of interrupted episodes by the reason of the interruption."""
     observe: str = ""
-    """Form of the driver's observations"""
+    """Observation type of the driver."""
     control_dt: float = 0.05
-    """Time between two actions, s"""
+    """Time between two actions, s."""
     options: dict[str, Any] = field(default_factory=dict)
-    """Options of the scenario that were given or trained with"""
+    """Options of the scenario that were given, or that the policy was trained with."""
     physics: Any = None
-    """Physics that were given or trained with; None for the scenario's own"""
+    """Physics parameters that were given, or that the policy was trained with; None for
+    the defaults of the scenario."""
     drivers: dict[str, str] = field(default_factory=dict)
-    """Drivers of other seats, by agent"""
+    """Drivers of other seats, by agent."""
     seed: int = TEST_SEED
-    """Seed of the first episode"""
+    """Seed of the first episode."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields as a JSON object, `returns` under the key "return"."""
@@ -92,25 +96,27 @@ def evaluate(
     exact: bool = False,
     **keywords: Unpack[Keywords],
 ) -> EvaluationResult:
-    """Let a player play episodes at ``paddle_0`` and measure it.
+    """Let a driver play episodes at ``paddle_0`` and measure it.
 
-    What is not given is that of a policy's training: scenario, options, profile,
-    observations, control_dt. The result names them. All episodes are played in one
-    batch; on a real table they follow each other.
+    Scenario, options, profile, observation type and control_dt are those of the
+    training of a policy, if they are not given. The result contains them. All episodes
+    are played in one batch. On a real table they are played one after another.
 
     Args:
-        player: Driver, or what makes one, see `registry.make_driver`.
-        scenario: Scenario, see `registry.find_scenario`; None for that of training.
-        episodes: Number of episodes; episode i is the first of world i, with seed + i.
-        seed: Seed of the first episode; training never sees those from 2,000,000 on.
-        name: Name of the player in the result; None for its own.
-        exact: Whether keywords that are not given have their defaults instead.
-        **keywords: Keywords of the environment, drivers of other seats among them; see
-            `build_world`.
+        player: Driver, or its name, path or class, see `registry.make_driver`.
+        scenario: Scenario, see `registry.find_scenario`; None for the one of the
+            training.
+        episodes: Number of episodes. Episode i is the first one of world i and has the
+            seed ``seed + i``.
+        seed: Seed of the first episode. Training never uses seeds from 2,000,000 on.
+        name: Name of the driver in the result; None for its own name.
+        exact: True to use the defaults for keywords that are not given.
+        **keywords: Keywords of the environment, including the drivers of other seats;
+            see `build_world`.
 
     Raises:
-        ValueError: A seat without a driver, one that does not fit, or a reward term
-            that is nan, named.
+        ValueError: A seat has no driver or one that does not fit, or a reward term is
+            nan. The message names it.
     """
     episodes, seed = check_count("episodes", episodes), check_seed(seed)
     driver, keywords = make_driver(player), table_keywords(keywords)
@@ -119,8 +125,8 @@ def evaluate(
         scenario, keywords = as_trained({name: driver}, scenario, keywords)
         driver = seen_in(driver, keywords)
     if scenario is None:
-        raise ValueError("scenario: say what the driver is to play")
-    # On a real table episodes follow each other; elsewhere many are played at once.
+        raise ValueError("scenario: none was given; name the one to play")
+    # A real table has one world; backends of simulations play many worlds in a batch.
     real = is_live(keywords.get("backend", DEFAULT_BACKEND))
     game, dt = scenario_of(scenario, keywords), keywords.get("control_dt", 0.05)
     cycles = keywords.get("max_cycles") or round(game.seconds / dt)
@@ -138,13 +144,14 @@ def evaluate(
 
 
 def evaluate_recording(path: Path) -> EvaluationResult:
-    """Measure the first seat of a recording, as it was played.
+    """Measure the first seat of a recording.
 
     Args:
-        path: Recording of a simulation, of a match on a page or of a real table.
+        path: Recording of a simulation, of a match on the page or of a real table.
 
     Raises:
-        ValueError: No recording, one without steps, or one that lacks a column.
+        ValueError: The path is not a recording, or the recording has no steps or lacks
+            a column.
     """
     head, statistics = read_head(path), recorded_statistics(path)
     players = [str(row["person"] or row["driver"]) for row in head.get("players", [])]
@@ -157,24 +164,25 @@ def recorded_statistics(path: Path) -> EpisodeStatistics:
     """Return the statistics of the episodes of a recording.
 
     Raises:
-        ValueError: No recording, one without steps, or one that lacks a column.
+        ValueError: The path is not a recording, or the recording has no steps or lacks
+            a column.
     """
     whole_recordings_in([path])
     dt = float(read_head(path)["control_dt"])
     try:
         found = EpisodeStatistics(episodes_of(path, COLUMNS), dt)
     except KeyError as error:
-        raise ValueError(f"{path}: there is no column {error} in it") from error
+        raise ValueError(f"{path}: the recording has no column {error}") from error
     if not len(found.success):
-        raise ValueError(f"{path}: there are no steps in it")
+        raise ValueError(f"{path}: the recording has no steps")
     return found
 
 
 def recorded_outcomes(paths: Sequence[Path]) -> Outcomes:
-    """Return the outcomes of a method from recordings, each of one of its policies.
+    """Return the outcomes of a method from recordings, one for each of its policies.
 
     Raises:
-        ValueError: See `recorded_statistics`.
+        ValueError: A recording cannot be measured, see `recorded_statistics`.
     """
     found = [recorded_statistics(path) for path in paths]
     lengths = [len(each.success) for each in found]
@@ -197,8 +205,8 @@ def _result(
 
     Args:
         statistics: Statistics of the episodes.
-        act_ms: CPU time of a decision, ms; nan if it is not known.
-        head: Head of their recording, which describes the environment.
+        act_ms: CPU time of a decision, ms; nan if it is unknown.
+        head: Head of the recording of the episodes, which describes the environment.
         driver: Name of the driver that is measured.
         drivers: Names of the drivers of other seats, by agent.
     """
@@ -233,7 +241,7 @@ def _result(
 
 
 def name_of(player: object, driver: Driver) -> str:
-    """Return the name of a player in results: its own text, or its driver's."""
+    """Return the name of a driver in results: the given text, or its own name."""
     if isinstance(player, (str, Path)):
         return str(player)
     return str(getattr(driver, "source", type(driver).__name__))

@@ -20,25 +20,27 @@ class GameResults:
     """Results of G games of T teams."""
 
     won: Array
-    """(G, T) bool, True for the winner; all False in a draw"""
+    """True for the winner, (G, T) bool; all False in a draw."""
     margin: Array
-    """(G, T) return of a team's seats: goals for minus goals against"""
+    """Mean return of the seats of a team: goals for minus goals against, (G, T)."""
     lasted: Array
-    """(G, T) time at which the last seat of a team was out, s; infinite if none was"""
+    """Time at which the last seat of a team was eliminated, s, (G, T); infinite if none
+    was."""
     seconds: Array
-    """(G,) length, s"""
+    """Length of the games, s, (G,)."""
 
     @property
     def score(self) -> Array:
-        """(G, T) points: 1 for a win, an equal share of 1 for a draw."""
+        """Points, (G, T): 1 for a win, and an equal share of 1 for a draw."""
         drawn = ~self.won.any(-1, keepdims=True)
         return np.asarray(self.won + drawn / self.won.shape[1])
 
     @property
     def ahead(self) -> Array:
-        """(G, T, T) bool: the first team came in ahead of the second.
+        """True where the first team is ranked before the second, (G, T, T) bool.
 
-        The winner, then who was out later, then who has the better margin.
+        The winner is first. The other teams are ordered by the time of their
+        elimination, the latest first, and then by their margin.
         """
         ahead = np.zeros((*self.won.shape, self.won.shape[1]), np.bool_)
         equal = np.ones_like(ahead)
@@ -56,7 +58,7 @@ class GameResults:
 
 
 def teams_of(seats: Sequence[int]) -> Array:
-    """Return (seats,) the number of each seat's team, from 0 without gaps."""
+    """Return the number of the team of each seat, (seats,), from 0 without gaps."""
     return np.unique(np.asarray(seats), return_inverse=True)[1]
 
 
@@ -68,18 +70,18 @@ def play_against(
     seed: int,
     keywords: Keywords | None = None,
 ) -> tuple[Array, Array]:
-    """Let one player play each of R opponents, who play for all other teams.
+    """Let one player play against each of R opponents, which fill all other teams.
 
     Args:
-        scenario: name of a game.
-        player: driver; it changes ends from game to game.
-        opponents: drivers.
-        games: number of games against each.
-        seed: seed of the first game.
-        keywords: keywords of the environment.
+        scenario: Name of a game.
+        player: Driver of the player. It changes ends from game to game.
+        opponents: Drivers of the opponents.
+        games: Number of games against each opponent.
+        seed: Seed of the first game.
+        keywords: Keywords of the environment.
 
     Returns:
-        The player's mean score and mean margin against each opponent, (R,) each.
+        Mean score and mean margin of the player against each opponent, (R,) each.
     """
     keywords = keywords or {}
     scene = scenario_of(scenario, keywords).scene
@@ -100,18 +102,19 @@ def play_games(
     keywords: Keywords | None = None,
     report: Callable[[float], None] = lambda share: None,
 ) -> GameResults:
-    """Play G games to their ends, all at once.
+    """Play G games to their ends in one batch.
 
     Args:
-        scenario: name of a game.
-        players: drivers.
-        lineups: (G, T) number of the player of each team in each game.
-        seed: seed of the first game; game i has seed + i.
-        keywords: keywords of the environment, see `build_world`.
-        report: called after every control step with the share of the longest game.
+        scenario: Name of a game.
+        players: Drivers of the players.
+        lineups: Index of the player of each team in each game, (G, T).
+        seed: Seed of the first game; game i has the seed ``seed + i``.
+        keywords: Keywords of the environment, see `build_world`.
+        report: Function that is called after every control step with the finished share
+            of the longest possible game.
 
     Raises:
-        ValueError: a scenario without teams that play each other.
+        ValueError: The scenario has no teams that play against each other.
     """
     games = len(lineups)
     forms = [player.observe for player in players if player.observe]
@@ -123,10 +126,10 @@ def play_games(
             f"airhockey crossplay {scenario}" if together else "airhockey evaluate"
         )
         raise ValueError(
-            f"{scenario!r} has no teams that play against each other; try {instead}"
+            f"{scenario!r} has no teams that play against each other; use {instead}"
         )
     if lineups.shape != (games, teams.max() + 1):
-        raise ValueError(f"{scenario!r} is played by {teams.max() + 1} teams")
+        raise ValueError(f"lineups: {scenario!r} needs {teams.max() + 1} teams")
     roster = Roster(world)
     for number, player in enumerate(players):
         roster.add(f"player {number}", player)

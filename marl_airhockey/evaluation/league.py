@@ -1,4 +1,4 @@
-"""League of players of a game of two sides or more."""
+"""League: games of all players against each other in a game of two or more teams."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
 
 LEAGUE_SEED = 3_000_000
-"""Seed of a league's first game"""
+"""Seed of the first game of a league."""
 BATCH = 4096
-"""Most games in one batch"""
+"""Largest number of games in one batch."""
 
 
 def league(
@@ -34,26 +34,27 @@ def league(
     report: Callable[[float], None] = lambda share: None,
     **keywords: Unpack[Keywords],
 ) -> Standings:
-    """Let every player play every other and rate them.
+    """Let every player play against every other one, and compute ratings.
 
-    What is not given is that of the policies' training, which must agree. In games of
-    more than two sides all comparisons of ranks count, as a Plackett-Luce model is
-    fitted by all pairs of its rankings (Azari Soufiani and others, 2013).
+    Keywords that are not given are those of the training of the policies, which must
+    agree. In games of more than two teams all comparisons of ranks count: a
+    Plackett-Luce model is fitted by all pairs of its rankings (Azari Soufiani and
+    others, 2013).
 
     Args:
-        scenario: Name of a game of two sides or more.
-        players: Players by name, see `registry.make_driver`, two at least; or their
-            names alone.
-        games: Number of games of each pair, on average if there are more than two
-            sides; of two, they change ends at half of them.
+        scenario: Name of a game of two or more teams.
+        players: Two or more players by name, see `registry.make_driver`; or a sequence
+            of names of drivers.
+        games: Number of games of each pair, an even number. With two teams, the players
+            change ends after half of the games. With more teams, it is the mean number.
         seed: Seed of the first game.
-        exact: Whether keywords that are not given have their defaults instead.
-        report: Function that is called with the share of the games that is played.
+        exact: True to use the defaults for keywords that are not given.
+        report: Function that is called with the share of the games that are finished.
         **keywords: Keywords of the environment.
 
     Raises:
-        ValueError: A single player, an odd number of games, or a scenario without
-            sides that play against each other.
+        ValueError: There is only one player, the number of games is odd, or the
+            scenario has no teams that play against each other.
     """
     drivers, keywords = seated_players(players, scenario, keywords, exact)
     count = len(drivers)
@@ -61,7 +62,8 @@ def league(
         raise ValueError("a league needs at least two players, of different names")
     if games < 2 or games % 2:
         raise ValueError(
-            f"games: {games} must be an even number above 0, as ends change at half"
+            f"games: {games} must be an even number above 0, because the players "
+            "change ends after half of them"
         )
     scene = scenario_of(scenario, keywords).scene
     sides = int(teams_of([seat.team for seat in scene.seats]).max()) + 1
@@ -87,11 +89,21 @@ def league(
 
 
 def lineups_of(players: int, sides: int, games: int, seed: int) -> Array:
-    """Return (G, sides) who plays where, so that each pair meets ``games`` times.
+    """Return lineups in which each pair of players meets ``games`` times.
 
-    With two sides each pair does, half of the games at either end. With more, those who
-    have met least meet in each game, on average ``games`` times; nobody plays twice in
-    a game unless there are fewer players than sides.
+    With two teams, each pair plays half of its games at either end. With more teams,
+    each game has the players that met least, so that pairs meet ``games`` times on
+    average. A player is in a game more than once only if there are fewer players than
+    teams.
+
+    Args:
+        players: Number of players.
+        sides: Number of teams.
+        games: Number of games of each pair.
+        seed: Seed of the order with more than two teams.
+
+    Returns:
+        Index of the player of each team in each game, (G, sides).
     """
     if sides == 2:
         pairs = np.array(list(combinations(range(players), 2))).repeat(games, axis=0)
@@ -106,7 +118,7 @@ def lineups_of(players: int, sides: int, games: int, seed: int) -> Array:
         while len(row) < sides:
             cost = met[row].sum(0) if row else met.sum(0)
             cost = cost + rng.uniform(0.0, 0.5, players)
-            # Those who are in come again when all are.
+            # Players are only repeated when every player is in the game.
             cost[row] += 1e9 * np.array([row.count(player) for player in row])
             row.append(int(cost.argmin()))
         for a, b in combinations(sorted(set(row)), 2):
@@ -118,16 +130,17 @@ def lineups_of(players: int, sides: int, games: int, seed: int) -> Array:
 def compared(
     results: GameResults, lineups: Array, players: int
 ) -> tuple[Array, Array, Array]:
-    """Compare all players in all games by their places.
+    """Compare all players in all games by their ranks.
 
     Args:
-        results: of G games.
-        lineups: (G, T) who played where.
-        players: E.
+        results: Results of G games.
+        lineups: Index of the player of each team in each game, (G, T).
+        players: Number of players, E.
 
     Returns:
-        (E, E) each: how often the row's player came in ahead of the column's; how often
-        neither did; mean margin of the row's in games with the column's.
+        Three arrays (E, E): number of games in which the player of the row was ahead of
+        the player of the column, number of games in which neither was ahead, and mean
+        margin of the player of the row in games with the player of the column.
     """
     wins, draws, margin = np.zeros((3, players, players))
     ahead = results.ahead
@@ -142,10 +155,10 @@ def compared(
 
 
 def find_policies(folder: Path) -> list[Path]:
-    """Return paths of the policies in a folder: runs of `train`, .npz and .onnx files.
+    """Return the policies in a folder: runs of `train`, .npz and .onnx files.
 
     Raises:
-        ValueError: a folder without policies.
+        ValueError: The folder has no policies.
     """
     runs = [path.parent for path in sorted(folder.rglob("config.toml"))]
     inside = {run for run in runs if any(map(Path.exists, policies_of(run)))}
@@ -157,22 +170,23 @@ def find_policies(folder: Path) -> list[Path]:
     ]
     found = [*sorted(inside), *files]
     if not found:
-        raise ValueError(f"{folder}: no policies and no runs in it")
+        raise ValueError(f"{folder}: the folder contains no policies and no runs")
     return found
 
 
 def _ratings(wins: Array, draws: Array, share: int, seed: int) -> Array:
-    """Return (3, E) lower ends, medians and upper ends of ratings, 95 % between ends.
+    """Return the lower end, the median and the upper end of ratings, (3, E).
 
-    Ratings are drawn from what the shares of won, drawn and lost games of each pair may
-    be (Dirichlet, Jeffreys' prior), so that 100 wins of 100 leave a doubt, too.
+    The ends are those of a 95 % interval. The shares of won, drawn and lost games of
+    each pair are sampled from their posterior distribution (Dirichlet, Jeffreys'
+    prior). 100 wins in 100 games therefore do not give a share of exactly 1.
 
     Args:
-        wins: (E, E) comparisons.
-        draws: (E, E) those without a winner.
-        share: comparisons of a player in one game. They share its luck, so that each
-            counts as so much less than a game of its own.
-        seed: of the draws.
+        wins: Number of comparisons that the player of the row won, (E, E).
+        draws: Number of comparisons without a winner, (E, E).
+        share: Number of comparisons of a player in one game. They are not independent,
+            so each counts as 1 / share of a game.
+        seed: Seed of the samples.
     """
     rng, found = np.random.default_rng(seed), []
     a, b = np.triu_indices(len(wins), 1)

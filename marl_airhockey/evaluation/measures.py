@@ -1,4 +1,4 @@
-"""Measures of episodes that were played or recorded, for the first seat."""
+"""Measures of played or recorded episodes, for the first seat."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ COLUMNS = (
     *("delayed_action", "command", "violation", "returns", "success"),
     "memory.touches",
 )
-"""Columns of an episode that are needed; touches only where the scenario has them"""
+"""Columns of an episode that are needed. Only some scenarios have the last one."""
 HIGH = 5.0
-"""Frequency above which the power of actions is a strain on an arm, Hz"""
+"""Frequency above which the power of the actions is a load on an arm, Hz."""
 
 
 @dataclass(frozen=True)
@@ -25,22 +25,22 @@ class EpisodeMeasures:
     """Measures of an episode of T control steps."""
 
     success: bool
-    """Whether it succeeded; False if a real table had to end it"""
+    """True for a success; False if a real table ended the episode early."""
     first_shot: bool
-    """Whether it succeeded before a second distinct touch"""
+    """True if the episode succeeded before a second distinct touch."""
     returns: float
     length: int
-    """Number of control steps, T"""
+    """Number of control steps, T."""
     touches: float
-    """Number of distinct touches"""
+    """Number of distinct touches."""
     violations: int
-    """Number of control steps in which the action exceeded a limit"""
+    """Number of control steps in which the action exceeded a limit."""
     jerk: Array
-    """(T, 2) jerk of the commands, m/s3"""
+    """Jerk of the commands, m/s3, (T, 2)."""
     actions: Array
-    """(T, 2) actions after their delay, fractions of top speed"""
+    """Actions after their latency, divided by the top speed, (T, 2)."""
     interruption: str
-    """Reason for which it was not played to its end; "" for none"""
+    """Reason why the episode was not played to its end; "" if it was."""
 
 
 def measure(episode: Episode, control_dt: float) -> EpisodeMeasures:
@@ -48,7 +48,7 @@ def measure(episode: Episode, control_dt: float) -> EpisodeMeasures:
 
     Args:
         episode: Episode with the `COLUMNS`, of at least one step.
-        control_dt: Time of a step, s.
+        control_dt: Length of a control step, s.
     """
     columns = episode.columns
     success = columns["success"].reshape(len(episode), -1) > 0
@@ -79,8 +79,8 @@ class EpisodeStatistics:
     """Statistics of n episodes.
 
     Args:
-        episodes: Episodes with the `COLUMNS`; those without steps are left out.
-        control_dt: Time of a step, s.
+        episodes: Episodes with the `COLUMNS`. Episodes without steps are skipped.
+        control_dt: Length of a control step, s.
     """
 
     def __init__(self, episodes: Iterable[Episode], control_dt: float) -> None:
@@ -93,7 +93,7 @@ class EpisodeStatistics:
         self.touches = np.array([e.touches for e in found])
         self.interrupted = np.array([bool(e.interruption) for e in found])
         self.interruptions = Counter(e.interruption for e in found if e.interruption)
-        """Reasons for which episodes were not played to their end, and their number"""
+        """Number of interrupted episodes by the reason of the interruption."""
         self._violations = sum(e.violations for e in found)
         self._jerk = [e.jerk for e in found]
         self._actions = [e.actions for e in found]
@@ -105,14 +105,14 @@ class EpisodeStatistics:
 
     @property
     def jerk(self) -> float:
-        """Root mean square of the commands' jerk, m/s3."""
+        """Root mean square of the jerk of the commands, m/s3."""
         return float(np.sqrt((np.concatenate(self._jerk) ** 2).mean()))
 
     @property
     def high_power(self) -> float:
-        """Share of the actions' power above `HIGH`.
+        """Share of the power of the actions above `HIGH`.
 
-        It is nan if that is not below half of the control rate.
+        It is nan unless half of the control rate is above `HIGH`.
         """
         if 0.5 / self._dt <= HIGH:
             return float("nan")

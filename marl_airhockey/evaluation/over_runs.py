@@ -1,4 +1,4 @@
-"""Success of several training runs, which differ by their seeds, taken together."""
+"""Success of several training runs that differ by their seeds."""
 
 from __future__ import annotations
 
@@ -13,20 +13,22 @@ from marl_airhockey.evaluation.stats import bootstrap, interval
 
 @dataclass(frozen=True)
 class OverRuns:
-    """Mean success of some runs with two intervals, which answer two questions."""
+    """Mean success of some runs, with an interval over runs and one over episodes."""
 
     runs: int
-    """Number of runs"""
+    """Number of runs."""
     success: float
-    """Mean success"""
+    """Mean success."""
     over_runs: tuple[float, float]
-    """95 % interval over the runs, by bootstrap: how another training may turn out"""
+    """95 % interval over the runs, by bootstrap. It shows the variation between
+    trainings."""
     over_episodes: tuple[float, float]
-    """95 % interval over all episodes, Wilson's: how exactly these runs are measured"""
+    """95 % interval over all episodes (Wilson). It shows the precision for these
+    runs."""
 
     @staticmethod
     def of(results: Sequence[EvaluationResult]) -> OverRuns:
-        """Sum up the results of some runs, of equally many episodes each."""
+        """Summarize the results of some runs with the same number of episodes."""
         success = np.array([result.success for result in results])
         episodes = sum(result.episodes for result in results)
         mean = float(success.mean())
@@ -35,7 +37,7 @@ class OverRuns:
 
     @property
     def text(self) -> str:
-        """One line for people."""
+        """One line with the success and both intervals."""
         (a, b), (c, d) = self.over_runs, self.over_episodes
         return (
             f"success of {self.runs} runs: {self.success:.3f}, 95 % over runs "

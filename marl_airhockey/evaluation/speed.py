@@ -1,7 +1,7 @@
-"""Speed of environments: whole env-steps with random actions, resets included.
+"""Speed of environments: environment steps with random actions, including resets.
 
-Rates are per CPU-second of this process and per second of wall time. Machines are
-shared: in every round each case is measured once, so that all meet the same load.
+Rates are per CPU-second of this process and per second of wall time. In every round
+each case is measured once, so that the load of other processes affects all cases alike.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ from marl_airhockey.make import make_world, parallel_env
 from marl_airhockey.sim.jit.threads import threads
 
 NUM_ACTIONS = 64
-"""Number of different actions, drawn beforehand"""
+"""Number of different actions, which are sampled in advance."""
 WARM_UP_STEPS = 100
-"""Steps before the first round: all is compiled then, episodes have spread apart"""
+"""Number of steps before the first round. They compile the code and desynchronize the
+episodes of the worlds."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """Environment to be measured; 0 ``worlds`` is the PettingZoo dict environment."""
+    """Environment to be measured; ``worlds=0`` is the PettingZoo environment."""
 
     scenario: str
     backend: str
@@ -47,7 +48,7 @@ class StepRate:
     env_steps_per_cpu_s: float
     env_steps_per_s: float
     spread: float
-    """Highest minus lowest rate per CPU-second, as a share of the median"""
+    """Highest minus lowest rate per CPU-second, divided by the median."""
 
     @property
     def agent_steps_per_cpu_s(self) -> float:
@@ -75,13 +76,13 @@ def measure_speed(
     seconds: float = 1.0,
     report: Callable[[], None] = lambda: None,
 ) -> list[StepRate]:
-    """Measure cases, each once in every round.
+    """Measure all cases, each once in every round.
 
     Args:
-        cases: environments to measure.
-        rounds: number of rounds.
-        seconds: CPU-seconds of a case in a round.
-        report: called after every measurement.
+        cases: Environments to measure.
+        rounds: Number of rounds.
+        seconds: CPU-seconds of each measurement.
+        report: Function that is called after every measurement.
     """
     runs = [_stepper(case) for case in cases]
     rates: list[list[tuple[float, float]]] = [[] for _ in cases]
@@ -98,7 +99,12 @@ def measure_speed(
 
 
 def _stepper(case: Case) -> tuple[Callable[[], int], int]:
-    """Return a function that makes and counts env-steps, and the agents' number."""
+    """Return a function that makes and counts environment steps, and the agents.
+
+    Returns:
+        Function that makes some steps and returns their number, and the number of
+        agents.
+    """
     rng = np.random.default_rng(0)
     if case.worlds == 0:
         env = parallel_env(case.scenario, backend=case.backend)
@@ -139,7 +145,7 @@ def _stepper(case: Case) -> tuple[Callable[[], int], int]:
 
 
 def _rate(run: Callable[[], int], seconds: float) -> tuple[float, float]:
-    """Return env-steps per CPU-second and per second of wall time."""
+    """Return environment steps per CPU-second and per second of wall time."""
     steps, cpu, wall = 0, time.process_time(), time.perf_counter()
     while (spent := time.process_time() - cpu) < seconds:
         steps += run()
@@ -147,7 +153,7 @@ def _rate(run: Callable[[], int], seconds: float) -> tuple[float, float]:
 
 
 def plot_speed(rates: Sequence[StepRate], path: Path) -> None:
-    """Draw env-steps per CPU-second against the number of worlds, a line per case."""
+    """Plot environment steps per CPU-second against the number of worlds."""
     import matplotlib.pyplot as plt
 
     from marl_airhockey.sim.render.charts import DPI, save, tidy

@@ -1,4 +1,4 @@
-"""Standings of a league: scores, ratings, table and picture."""
+"""Standings of a league: scores, ratings, table and plot."""
 
 from __future__ import annotations
 
@@ -20,33 +20,34 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class Standings:
-    """Results of E players, each against each other."""
+    """Results of E players that played against each other."""
 
     scenario: str
     names: tuple[str, ...]
     games: int
-    """Number of games of each pair, on average with more than two sides"""
+    """Number of games of each pair; the mean number with more than two teams."""
     wins: Array
-    """(E, E) number of games in which the row's player was ahead of the column's"""
+    """Number of games in which the player of the row was ahead of that of the column,
+    (E, E)."""
     draws: Array
-    """(E, E) number of games in which neither was"""
+    """Number of games in which neither player was ahead, (E, E)."""
     margin: Array
-    """(E, E) mean of the row's goals for minus goals against"""
+    """Mean goals for minus goals against of the player of the row, (E, E)."""
     ratings: Array
-    """(E,) Elo ratings, 1000 on average: the middle of what the games allow"""
+    """Elo ratings, (E,), 1000 on average: medians of the ratings that fit the games."""
     rating_intervals: Array
-    """(E, 2) 95 % intervals of the ratings"""
+    """95 % intervals of the ratings, (E, 2)."""
 
     @property
     def score(self) -> Array:
-        """(E, E) share of points, a draw being half a win; nan on the diagonal."""
+        """Share of points, (E, E), where a draw is half a win; nan on the diagonal."""
         with np.errstate(invalid="ignore"):
             share = (self.wins + 0.5 * self.draws) / self.played
         return np.asarray(share)
 
     @property
     def score_intervals(self) -> Array:
-        """(E, E, 2) 95 % intervals of the scores; nan on the diagonal."""
+        """95 % intervals of the scores, (E, E, 2); nan on the diagonal."""
         pairs = zip(self.score.flat, self.played.flat, strict=True)
         ends = [
             interval(float(score), int(n)) if n else (np.nan, np.nan)
@@ -56,26 +57,29 @@ class Standings:
 
     @property
     def played(self) -> Array:
-        """(E, E) number of games."""
+        """Number of games of each pair, (E, E)."""
         return np.asarray(self.wins + self.wins.T + self.draws)
 
     @property
     def order(self) -> list[int]:
-        """Numbers of the players, the best first."""
+        """Indices of the players, the best one first."""
         return [int(i) for i in np.argsort(-self.ratings, kind="stable")]
 
     @property
     def mixture(self) -> Array:
-        """(E,) shares of the players in the mixture that none of them beats.
+        """Shares of the players in the mixture that no player beats, (E,).
 
-        Who beats all others has all of it; in a cycle all have a part. See
-        `stats.nash_mixture`.
+        A player that beats all others has a share of 1. In a cycle all players have a
+        share. See `stats.nash_mixture`.
         """
         return nash_mixture(np.nan_to_num(self.score, nan=0.5))
 
     @property
     def cycles(self) -> list[tuple[str, str, str]]:
-        """Triples in which each beats the next, and the last the first, with 95 %."""
+        """Triples in which each player beats the next one, and the last one the first.
+
+        A player beats another one if the 95 % interval of its score is above 0.5.
+        """
         beats = np.zeros(self.score.shape, np.bool_)
         for a, b in permutations(range(len(self.names)), 2):
             low, _ = interval(float(self.score[a, b]), int(self.played[a, b]))
@@ -147,7 +151,7 @@ class Standings:
         return "\n".join(lines).rstrip() + "\n"
 
     def save(self, folder: Path) -> list[Path]:
-        """Write ``league.json``, ``league.md`` and ``league.png``; return them."""
+        """Write ``league.json``, ``league.md`` and ``league.png``; return the paths."""
         folder.mkdir(parents=True, exist_ok=True)
         files = [folder / f"league.{kind}" for kind in ("json", "md", "png")]
         files[0].write_text(json.dumps(self.to_json(), indent=1))
@@ -157,7 +161,7 @@ class Standings:
 
 
 def plot_scores(standings: Standings, path: Path) -> None:
-    """Draw the matrix of scores, the best player first."""
+    """Plot the matrix of scores, the best player first."""
     import matplotlib.pyplot as plt
 
     from marl_airhockey.sim.render.charts import DPI, save

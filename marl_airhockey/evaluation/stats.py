@@ -1,4 +1,4 @@
-"""Statistics of runs and games: intervals, robust means, ratings."""
+"""Statistics of runs and games: intervals, robust means and ratings."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 from marl_airhockey.types import Array
 
 RESAMPLES = 2000
-"""Resamples of a bootstrap"""
+"""Number of resamples of a bootstrap."""
 FEWEST_GROUPS = 5
-"""Fewest groups from which a jackknife gives an interval"""
+"""Smallest number of groups for which a jackknife gives an interval."""
 
 
 def interval(share: float, n: int) -> tuple[float, float]:
@@ -25,13 +25,13 @@ def interval(share: float, n: int) -> tuple[float, float]:
 
 
 def iqm(values: Array) -> float:
-    """Return the interquartile mean, that of the middle half (Agarwal et al., 2021).
+    """Return the interquartile mean, the mean of the middle half.
 
-    Values at the edges of the middle half count by the part that lies in it: right for
-    any number of values.
+    See Agarwal et al. (2021). A value at an edge of the middle half is weighted by the
+    part of it that is inside. The result is therefore exact for any number of values.
 
     Raises:
-        ValueError: no values.
+        ValueError: There are no values.
     """
     ordered = np.sort(np.ravel(values)).astype(float)
     n = len(ordered)
@@ -51,10 +51,10 @@ def bootstrap(
     """Return the 95 % percentile interval of a statistic.
 
     Args:
-        values: (runs, ...); runs are drawn with replacement, rows stay whole.
-        statistic: function of such an array.
-        seed: seed of the drawing.
-        resamples: number of resamples.
+        values: Results of runs, (runs, ...). Whole rows are resampled with replacement.
+        statistic: Function that computes the statistic of an array like ``values``.
+        seed: Seed of the resampling.
+        resamples: Number of resamples.
     """
     rows, rng = np.asarray(values), np.random.default_rng(seed)
     found = [
@@ -67,16 +67,20 @@ def bootstrap(
 def bounded_mean(
     groups: Sequence[Sequence[float]], bounds: tuple[float, float], seed: int = 0
 ) -> list[float]:
-    """Return a mean of bounded values in groups with a 95 % interval inside the bounds.
+    """Return the mean of bounded values in groups, and its 95 % interval.
 
-    The interval is of a bootstrap over the groups, with percentiles that are expanded
-    for few of them (Hesterberg, 2015); nan for fewer than `FEWEST_GROUPS`.
-    If all groups have the same mean, it is that of a share (Wilson, 1927).
+    The interval is inside the bounds. It is the interval of a bootstrap over the
+    groups, with percentiles that are expanded for small numbers of groups (Hesterberg,
+    2015). It is nan for fewer than `FEWEST_GROUPS` groups. If all groups have the same
+    mean, it is the interval of a share (Wilson, 1927).
 
     Args:
-        groups: Values, in groups that are independent of each other, such as people.
-        bounds: Least and largest possible value.
-        seed: Seed of the drawing.
+        groups: Values of groups that are independent of each other, such as people.
+        bounds: Smallest and largest possible value.
+        seed: Seed of the resampling.
+
+    Returns:
+        Mean, lower end and upper end.
     """
     chosen = [np.asarray(group, float) for group in groups if len(group)]
     if not chosen:
@@ -97,9 +101,10 @@ def bounded_mean(
 
 
 def student_t(degrees: int) -> float:
-    """Return the 97.5 % quantile of Student's t.
+    """Return the 97.5 % quantile of Student's t distribution.
 
-    By the series of Abramowitz and Stegun (1964), 26.7.5: to 0.2 % from 3 degrees on.
+    The series of Abramowitz and Stegun (1964), 26.7.5, is accurate to 0.2 % for 3 or
+    more degrees of freedom.
     """
     z, n = 1.959964, float(degrees)
     return float(
@@ -117,15 +122,16 @@ def jackknife(
 ) -> tuple[Array, Array]:
     """Return the 95 % interval of a statistic of data in groups, such as people.
 
-    Each group is left out once (Tukey, 1958). What is repeated within a group, such as
-    the games of a person, need not be independent.
+    Each group is left out once (Tukey, 1958). Data within a group, such as the games of
+    a person, need not be independent.
 
     Args:
         groups: Number of groups, at least `FEWEST_GROUPS`.
-        statistic: Function of the numbers of those that are used; a number or an array.
+        statistic: Function that computes a number or an array from the indices of the
+            groups to use.
 
     Raises:
-        ValueError: Fewer groups.
+        ValueError: There are fewer than `FEWEST_GROUPS` groups.
     """
     if groups < FEWEST_GROUPS:
         raise ValueError(f"jackknife: {groups} groups; {FEWEST_GROUPS} are needed")
@@ -138,25 +144,25 @@ def jackknife(
 
 
 def probability_of_improvement(new: Array, old: Array) -> float:
-    """Return the probability that a new run beats an old one; a tie counts half.
+    """Return the probability that a new run is better than an old one; ties count half.
 
     Args:
-        new: (n,) results of runs.
-        old: (m,) results of runs to compare with.
+        new: Results of runs of the new method, (n,).
+        old: Results of runs of the old method, (m,).
     """
     gap = np.sign(np.subtract.outer(np.ravel(new), np.ravel(old)))
     return float(0.5 + 0.5 * gap.mean())
 
 
 def elo(score: Array, games: Array) -> Array:
-    """Return (E,) Elo ratings of E players, 1000 on average (Bradley and Terry).
+    """Return Elo ratings of E players, (E,), 1000 on average (Bradley and Terry).
 
-    Every player is given one more game, a draw against an average player, so that the
-    ratings of those who never won or never lost stay finite.
+    A draw against an average player is added to the games of every player, so that the
+    ratings of players without a win or without a loss are finite.
 
     Args:
-        score: (E, E) points of the row's player against the column's.
-        games: (E, E) number of games between them.
+        score: Points of the player of the row against that of the column, (E, E).
+        games: Number of games between them, (E, E).
     """
     share = np.ones(len(score))
     won = score.sum(-1) + 0.5
@@ -171,20 +177,21 @@ def elo(score: Array, games: Array) -> Array:
 
 
 def nash_mixture(score: Array, temperature: float = 0.003) -> Array:
-    """Return the mixture of E players that no player beats: Nash averaging.
+    """Return the mixture of E players that no player beats (Nash averaging).
 
-    Of all equilibria of the game in which both sides choose a player it is, nearly, the
-    one of most entropy, so that copies of a player share its part (Balduzzi and others,
-    2018). It is the logit equilibrium of a low temperature, found by mirror steps with
-    a look ahead, which converge.
+    Both sides choose a player. Of all equilibria of this game, the result is close to
+    the one with the largest entropy, in which copies of a player divide its share
+    (Balduzzi and others, 2018). It is the logit equilibrium of a low temperature,
+    computed by mirror steps with a look ahead, which converge.
 
     Args:
-        score: (E, E) share of points of the row's player against the column's.
-        temperature: in points; a player that scores so much less against the mixture
-            has about a third of the share.
+        score: Share of points of the player of the row against that of the column, (E,
+            E).
+        temperature: Temperature in points. A player whose score against the mixture is
+            lower by this value has about a third of the share.
 
     Returns:
-        (E,) shares, 1 in sum.
+        Shares with a sum of 1, (E,).
     """
     edge, step = (score - score.T) / 2.0, 1.0
     keep = 1.0 - step * temperature
@@ -198,13 +205,13 @@ def nash_mixture(score: Array, temperature: float = 0.003) -> Array:
 
 
 def _shares(weight: Array) -> Array:
-    """Return exponentials of weights (E,) as shares."""
+    """Return the softmax of weights (E,)."""
     share = np.exp(weight - weight.max())
     return np.asarray(share / share.sum())
 
 
 def without_nan(data: Any) -> Any:
-    """Return nested dicts and lists with None for nan, which JSON does not know."""
+    """Return nested dicts and lists with None for nan, which JSON does not have."""
     if isinstance(data, Mapping):
         return {name: without_nan(value) for name, value in data.items()}
     if isinstance(data, (list, tuple)):

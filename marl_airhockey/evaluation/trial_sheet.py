@@ -1,4 +1,4 @@
-"""Trial sheet: who plays which trial from which start, and a row for each trial."""
+"""Trial table: plan of the trials of a comparison, and a row for each played one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 from marl_airhockey.evaluation.comparison import Comparison, Outcomes, compare
 
 PLAN, ROWS = "plan.json", "trials.csv"
-"""Names of the files"""
+"""Names of the files of the plan and of the rows."""
 
 
 @dataclass(frozen=True)
@@ -24,15 +24,16 @@ class TrialPlan:
 
     scenario: str
     where: dict[str, Any]
-    """Backend, profile, options and who puts the puck on the table"""
+    """Backend, profile, options and the person who puts the puck on the table."""
     methods: dict[str, list[str]]
-    """Policies by the name of their method: its seeds, say"""
+    """Policies by the name of their method, for example one policy for each seed."""
     codes: dict[str, str]
-    """Letter of each method, which stands for it in the rows"""
+    """Letter of each method, which replaces its name in the rows."""
     starts: list[int]
-    """Seed of the episode that begins at each start"""
+    """Seed of the episode that begins at each start."""
     trials: list[list[Any]]
-    """Index of the start, name of the method and index of its policy, in order"""
+    """Index of the start, name of the method and index of its policy, in order of
+    play."""
 
 
 @dataclass(frozen=True)
@@ -43,24 +44,25 @@ class TrialRow:
     start: int
     code: str
     policy: int
-    """Index among the policies of its method"""
+    """Index of the policy among the policies of its method."""
     success: int
     returns: float
     seconds: float
-    """Length of the episode, s"""
+    """Length of the episode, s."""
     touches: float
     began: str
     ended: str
-    """Time of day, ISO 8601, UTC"""
+    """Times of beginning and end, ISO 8601, UTC."""
     reason: str
-    """Why a real table had to end it, which is no success; "" as a rule"""
+    """Reason why a real table ended the trial early, which is not a success; "" for
+    none."""
 
     @classmethod
     def read(cls, row: Mapping[str, str]) -> TrialRow:
         """Return a row of the file.
 
         Raises:
-            ValueError: a field is missing or no number.
+            ValueError: A field is missing or has the wrong type.
         """
         kinds = {"int": int, "float": float, "str": str}
         try:
@@ -79,16 +81,16 @@ def plan_trials(
 ) -> TrialPlan:
     """Return a plan in which every method plays from every start.
 
-    Trial k of a method is from start k, again from the first after the last, by its
-    policies in turn; within each k the order of the methods is drawn.
+    Trial k of a method begins at start k modulo the number of starts. The policies of a
+    method take turns. Within each k the order of the methods is sampled.
 
     Args:
-        scenario: its name.
-        methods: policies by the name of their method.
-        starts: seeds of the starts.
-        trials: number of them of each method.
-        where: what the plan says of the table and its rules.
-        seed: of the order, and of the letters.
+        scenario: Name of the scenario.
+        methods: Policies by the name of their method.
+        starts: Seeds of the starts.
+        trials: Number of trials of each method.
+        where: Description of the table and its rules, see `TrialPlan`.
+        seed: Seed of the order and of the letters.
     """
     rng = np.random.default_rng(seed)
     names = list(methods)
@@ -104,21 +106,21 @@ def plan_trials(
 
 
 def _letter(index: int) -> str:
-    """Return A, B, ..., Z, A1, ..."""
+    """Return the letter of an index: A, B, ..., Z, A1, ..."""
     return chr(ord("A") + index % 26) + (str(index // 26) if index >= 26 else "")
 
 
 class TrialSheet:
-    """Sheet of a comparison in a folder: its plan and a row for each trial.
+    """Trial table in a folder: plan of a comparison, and a row for each played trial.
 
-    One that was cut goes on after its last row.
+    An interrupted comparison is continued after its last row.
 
     Args:
-        folder: of the files; made if it does not exist.
-        plan: what is to be played.
+        folder: Folder of the files, which is created if it does not exist.
+        plan: Plan of the trials.
 
     Raises:
-        ValueError: the folder holds trials of another plan, or broken rows.
+        ValueError: The folder contains trials of another plan, or broken rows.
     """
 
     def __init__(self, folder: Path, plan: TrialPlan) -> None:
@@ -126,7 +128,9 @@ class TrialSheet:
         folder.mkdir(parents=True, exist_ok=True)
         path, text = folder / PLAN, json.dumps(asdict(plan), indent=1)
         if path.exists() and path.read_text() != text:
-            raise ValueError(f"{folder} holds trials of another plan: another --out")
+            raise ValueError(
+                f"{folder} contains trials of another plan: choose another --out"
+            )
         path.write_text(text)
         self.rows = self._read()
 
@@ -136,28 +140,28 @@ class TrialSheet:
             path.write_text(",".join(f.name for f in fields(TrialRow)) + "\n")
         text = path.read_text()
         if not text.endswith("\n"):
-            # The row that was being written when it was cut.
+            # The last row is incomplete after an interruption.
             text = text[: text.rfind("\n") + 1]
             path.write_text(text)
         return [TrialRow.read(row) for row in csv.DictReader(text.splitlines())]
 
     def add(self, row: TrialRow) -> None:
-        """Add a row; it is in the file when this returns."""
+        """Append a row to the file and to `rows`."""
         with (self.folder / ROWS).open("a", newline="") as file:
             csv.writer(file, lineterminator="\n").writerow(asdict(row).values())
         self.rows.append(row)
 
     def compare(self) -> Comparison:
-        """Return the comparison by the rows there are.
+        """Return the comparison of the methods by the rows so far.
 
         Raises:
-            ValueError: a method without a trial.
+            ValueError: A method has no trial yet.
         """
         found = {}
         for name, code in self.plan.codes.items():
             rows = [row for row in self.rows if row.code == code]
             if not rows:
-                raise ValueError(f"{self.folder}: no trial of {name!r} yet")
+                raise ValueError(f"{self.folder}: {name!r} has no trials yet")
             found[name] = Outcomes(
                 np.array([row.policy for row in rows]),
                 np.array([row.success for row in rows], float),
@@ -168,7 +172,7 @@ class TrialSheet:
 
     @property
     def trials_an_hour(self) -> float:
-        """Number of trials in an hour, from first beginning to last end."""
+        """Number of trials per hour, from the first beginning to the last end."""
         began = min(datetime.fromisoformat(row.began) for row in self.rows)
         ended = max(datetime.fromisoformat(row.ended) for row in self.rows)
         return 3600 * len(self.rows) / max((ended - began).total_seconds(), 1e-3)

@@ -1,7 +1,8 @@
-"""Trials: policies compared on one table, from the same starts and in turns.
+"""Trials: comparison of policies on one table, from the same starts and in turns.
 
-What changes in the course of a day (a table that warms up, an operator who gets better)
-meets all of them alike, and who puts the puck on the table is not told who will play.
+Changes in the course of a day, such as a warmer table or a more skilled operator,
+affect all policies alike. The operator, who puts the puck on the table, need not know
+which policy plays.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array, Memory
 
 DRAWS = 20
-"""Starts that are drawn for each one that is taken"""
+"""Number of sampled starts for each start that is chosen."""
 FAR = 1e3
-"""Number above which a memory tells of nothing on the table"""
+"""Magnitude from which an element of the memory does not describe the table."""
 ROUNDS = 12
-"""Rounds in which the taken ones are spread"""
+"""Number of iterations of the algorithm that spreads the starts."""
 
 
 def play_trials(
@@ -38,22 +39,23 @@ def play_trials(
     drivers: dict[str, list[Driver]],
     done: Callable[[int], None] = lambda trials: None,
 ) -> None:
-    """Play the trials of a sheet that have no row yet, and write their rows.
+    """Play the trials of a table that have no row yet, and write their rows.
 
     Args:
-        world: one, on the table of the plan, before its first episode; any driver has
-            `paddle_0`.
-        sheet: of the plan.
-        drivers: of `paddle_0`, by the plan's methods and policies.
-        done: called with the number of trials that are done.
+        world: Batch of one world on the table of the plan, before its first episode,
+            with a driver at ``paddle_0``.
+        sheet: Table of the trials.
+        drivers: Drivers of ``paddle_0``, by name of the method and index of the policy.
+        done: Function that is called with the number of finished trials.
 
     Raises:
-        ValueError: a driver that cannot play in this world.
+        ValueError: A driver cannot play in this world.
     """
     plan, own = sheet.plan, world.driven[0]
     with ExitStack() as stack:
         stack.callback(world.driven.__setitem__, 0, own)
-        # All sit down before the first episode: what they see is kept from then.
+        # All drivers take the seat before the first episode, when the memory of their
+        # observations begins.
         seats = {
             (name, k): _seat(world, driver, stack)
             for name, policies in drivers.items()
@@ -86,20 +88,21 @@ def play_trials(
 
 
 def _seat(world: World, driver: Driver, stack: ExitStack) -> DrivenSeat:
-    """Let a driver sit down at paddle_0, until a stack is left."""
+    """Return a seat with a driver at ``paddle_0``; the stack closes the driver."""
     seat = DrivenSeat(0, driver, world.observer, 1, world.control_dt)
     stack.push(driver.__exit__)
     return seat
 
 
 def spread_starts(world: World, count: int) -> list[int]:
-    """Return seeds of starts that are spread over all that a scenario draws.
+    """Return seeds of starts that are spread over everything that a scenario samples.
 
-    They are spread over places, velocities and goals, each by its standard deviation.
+    They are spread over positions, velocities and goals, each divided by its standard
+    deviation.
 
     Args:
-        world: one; it is left at some start.
-        count: how many.
+        world: Batch of one world, which is left at some start.
+        count: Number of starts.
     """
     seeds = TEST_SEED + np.arange(DRAWS * count)
     starts = np.stack([_start(world, int(seed)) for seed in seeds])
@@ -110,15 +113,15 @@ def spread_starts(world: World, count: int) -> list[int]:
 
 
 def spread(points: Array, count: int) -> Array:
-    """Return indices of points (n, m) that are spread over all, each point once.
+    """Return indices of points (n, m) that are spread over all points, all different.
 
-    They are those nearest to the means of Lloyd's algorithm (1982).
+    They are the points nearest to the means of Lloyd's algorithm (1982).
     """
     nearest = np.arange(count)
     for _ in range(ROUNDS):
         means = points[nearest]
         closest = _distances(points, means).argmin(1)
-        # Points that are all alike are nearest to the first mean; others have none.
+        # If all points are equal, the first mean is nearest to all of them.
         means = np.stack(
             [
                 points[closest == k].mean(0) if k in closest else means[k]
@@ -130,7 +133,7 @@ def spread(points: Array, count: int) -> Array:
 
 
 def write_starts(world: World, seeds: list[int], path: Path) -> None:
-    """Write where puck and paddle are at some starts, for marks on the table (CSV)."""
+    """Write positions of puck and paddle at starts as CSV, for marks on the table."""
     bodies = [f"paddle_{i}" for i in range(len(world.scene.seats))]
     bodies += [f"puck_{i}" for i in range(world.scene.pucks)]
     columns = [f"{body}_{axis}_m" for body in bodies for axis in "xy"]
@@ -144,19 +147,19 @@ def write_starts(world: World, seeds: list[int], path: Path) -> None:
 
 
 def _drawn(world: World, seed: int) -> tuple[State, Memory]:
-    """Return the state and the memory of the start that a seed draws."""
+    """Return the state and the memory of the start of a seed."""
     world.seed(seed)
     world.draw_worlds(np.array([0]))
     return world.get_state()
 
 
 def _start(world: World, seed: int) -> Array:
-    """Return the numbers of the start that a seed draws."""
+    """Return the numbers that describe the start of a seed."""
     state, memory = _drawn(world, seed)
     drawn = [value for value in memory.values() if value.dtype.kind == "f"]
     parts = [state.position, state.velocity, *drawn]
     row = np.concatenate([part[0].ravel() for part in parts])
-    # Moments that have not come yet are far away, or nan.
+    # Times of events that have not occurred yet are very large, or nan.
     return np.where(np.abs(row) < FAR, row, 0.0)
 
 
@@ -165,7 +168,7 @@ def _distances(points: Array, means: Array) -> Array:
 
 
 def _nearest(points: Array, means: Array) -> Array:
-    """Return the index of the point nearest to each mean, each point once."""
+    """Return the index of the point nearest to each mean, without repetition."""
     distances = _distances(points, means)
     found: list[int] = []
     for k in range(len(means)):

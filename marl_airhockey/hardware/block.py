@@ -1,4 +1,4 @@
-"""Block: numbers that one process writes and others read, without a lock.
+"""Lock-free block of numbers that one process writes and others read.
 
 A counter is odd while a block is written, so that a reader does not mix old and new
 numbers. A process that is killed while it writes leaves no lock behind.
@@ -11,14 +11,14 @@ import time
 from marl_airhockey.types import Array
 
 PATIENCE = 0.05
-"""Time after which a reader no longer waits for an unfinished write, s"""
+"""Time after which a reader no longer waits for an unfinished write, s."""
 
 
 class Block:
     """Numbers in shared memory; the first one counts writes.
 
     Args:
-        numbers: (1 + n,) counter and n values.
+        numbers: Counter and n values (1 + n,).
     """
 
     def __init__(self, numbers: Array) -> None:
@@ -26,7 +26,7 @@ class Block:
 
     def write(self, values: tuple[float, ...] | Array) -> None:
         """Write all numbers."""
-        # Odd in any case, even after a writer that was killed.
+        # Odd, even if the last writer was killed.
         self._counter[0] += 1 + self._counter[0] % 2
         self._numbers[:] = values
         self._counter[0] += 1

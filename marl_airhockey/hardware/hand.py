@@ -1,4 +1,4 @@
-"""Hand: position and velocity of a paddle that a person moves under a camera."""
+"""Position and velocity of a paddle that a person moves under a camera."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from marl_airhockey.hardware.vision.watcher import Watcher
 from marl_airhockey.types import Array
 
 LOST = 0.25
-"""Time without a sighting after which the hand counts as gone, s"""
+"""Time without a sighting after which the hand counts as absent, s."""
 AHEAD = 0.12
-"""Longest time of an extrapolation from the last sighting, s"""
+"""Longest time of an extrapolation from the last sighting, s."""
 JERK = 60.0
-"""Standard deviation of a hand's jerk, m/s3: about that of strokes of 0.2 m at 2 Hz"""
+"""Standard deviation of a hand's jerk, m/s3, about that of strokes of 0.2 m at 2 Hz."""
 START = (0.001, 1.0, 10.0)
 """Standard deviations of position, m, velocity, m/s, and acceleration, m/s2, of a hand
-that enters the image"""
+that enters the image."""
 NOISE = 0.001
-"""Standard deviation of the position of a sighting, m"""
+"""Standard deviation of the position of a sighting, m."""
 
 
 class HandMotion(NamedTuple):
-    """Motion of a hand now, field frame."""
+    """Present motion of a hand, field frame."""
 
     place: Array
-    """(2,) position, m"""
+    """Position (2,), m."""
     velocity: Array
-    """(2,) velocity, m/s"""
+    """Velocity (2,), m/s."""
     age: float
-    """Time since the last sighting, s"""
+    """Time since the last sighting, s."""
 
 
 class Hand:
-    """Hand under the camera of a rig. It is used in a ``with`` block.
+    """Hand under the camera of a rig, used in a ``with`` block.
 
     A Kalman filter with a random jerk estimates the motion from the sightings.
 
@@ -92,11 +92,11 @@ class Hand:
         if self._camera.trouble:
             return f"the hand's {self._camera.trouble}"
         if self._taken is None or time.monotonic() - self._taken > LOST:
-            return "the hand's paddle is not in the picture"
+            return "the hand's paddle is not in the image"
         return ""
 
     def read(self) -> HandMotion | None:
-        """Return the hand's motion now; None while it is not seen."""
+        """Return the present motion of the hand, or None while it is not visible."""
         for sighting in self._watcher.take():
             self._update(sighting.place, sighting.taken)
         if self._taken is None:
@@ -113,7 +113,7 @@ class Hand:
         Both axes share one covariance, as their noise is the same.
 
         Args:
-            position: (2,) position of a sighting, field frame, m.
+            position: Position (2,) of a sighting, field frame, m.
             taken: Time of the sighting, s.
         """
         if self._taken is None or taken - self._taken > LOST:
@@ -142,5 +142,5 @@ class Hand:
 
 
 def _flow(dt: float) -> Array:
-    """Return the transition (3, 3) of position, velocity, acceleration over dt, s."""
+    """Return the transition matrix (3, 3) of position, velocity and acceleration."""
     return np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])

@@ -15,7 +15,7 @@ from marl_airhockey.sim.core.checks import build, check_fields
 from marl_airhockey.types import Array
 
 KIND = "hand"
-"""Kind of the file"""
+"""Kind of rig in the file."""
 
 
 @dataclass(frozen=True)
@@ -23,27 +23,27 @@ class HandRig:
     """Rig of a hand. Field frame: origin at the field's centre, x away from the person.
 
     Raises:
-        ValueError: A field has another type or is outside its range.
+        ValueError: A field has the wrong type or is outside its range.
     """
 
     camera: str
-    """Source of the frames, see `camera.open_source`"""
+    """Source of the frames, see `camera.open_source`."""
     view: CameraView
-    """View of the field"""
+    """View of the field."""
     paddle: Colour
-    """Colour of the paddle's top"""
+    """Colour of the paddle's top."""
     size: tuple[float, float]
-    """Length, along x, and width of the field, m"""
+    """Length, along x, and width of the field, m."""
     radius: float = 0.047625
-    """Radius of the paddle, m"""
+    """Radius of the paddle, m."""
     height: float = 0.06
-    """Height of the paddle's top above the field, m"""
+    """Height of the paddle's top above the field, m."""
     readout: float = 0.0
-    """Time between the exposures of the first and the last row of a frame, s"""
+    """Time between the exposures of the first and the last row of a frame, s."""
     tags: dict[str, list[list[float]]] = field(default_factory=dict)
-    """Corners of the printed tags by number, field frame, m"""
+    """Corners of the printed tags by number, field frame, m."""
     made: str = ""
-    """Date of the calibration"""
+    """Date of the calibration."""
 
     def __post_init__(self) -> None:
         check_fields(

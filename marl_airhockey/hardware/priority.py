@@ -1,4 +1,4 @@
-"""Priority: raised scheduling priority for processes with deadlines."""
+"""Raised scheduling priority for processes with deadlines."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import contextlib
 import os
 
 FIRST = -20
-"""Niceness of a process with deadlines"""
+"""Niceness of a process with deadlines."""
 
 
 def raise_priority() -> None:
-    """Ask the operating system to schedule this process first.
+    """Request the highest scheduling priority for this process.
 
-    Without the permission for it, and on Windows, the process keeps its priority, and a
-    busy machine may delay it.
+    Without the permission, and on Windows, the priority does not change, and a busy
+    machine may delay the process.
     """
     if hasattr(os, "nice"):
         with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""Rig: the devices at one real table and their calibration, in one JSON file."""
+"""Devices of one real table and their calibration, in one JSON file."""
 
 from __future__ import annotations
 
@@ -29,51 +29,52 @@ from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 LAB = re.compile(r"lab:\d+")
-"""Form of an operator that is a virtual lab"""
+"""Pattern of an operator that is a virtual lab."""
 LATEST = 0.2
-"""Longest time until a stop begins, s, in the stopping distance that a rig reports"""
+"""Longest time until a stop begins, s, as part of the stopping distance that a rig
+reports."""
 
 
 @dataclass(frozen=True)
 class Rig:
-    """Rig: what the backend ``real`` needs to know about a table.
+    """Description of a real table for the backend ``real``.
 
     Raises:
-        ValueError: A field has another type or is outside its range, or the limits are
-            too close to those at the pendant.
+        ValueError: A field has the wrong type or is outside its range, or the limits
+            are too close to the limits at the pendant.
     """
 
     table: str
-    """Name of the table's preset"""
+    """Name of the table's preset."""
     camera: str
-    """Source of the frames, see `camera.open_source`"""
+    """Source of the frames, see `camera.open_source`."""
     view: CameraView
     puck: Colour
-    """Colour of the puck"""
+    """Colour of the puck."""
     robot: str
-    """Address of the arm's controller"""
+    """Address of the arm's controller."""
     mounting: Mounting
     tool: tuple[float, ...] = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
-    """Pose of the paddle's foot, flange frame, m and rad"""
+    """Pose of the paddle's foot, flange frame, m and rad."""
     payload: float = 0.6
-    """Mass of the paddle and its holder, kg"""
+    """Mass of the paddle and its holder, kg."""
     latency: float = LATENCY
     """Time from the middle of an exposure until its frame has arrived, s; ``airhockey
-    calibrate delay`` measures it"""
+    calibrate delay`` measures it."""
     readout: float = 0.0
-    """Time between the exposures of the first and the last row of a frame, s"""
+    """Time between the exposures of the first and the last row of a frame, s."""
     tags: dict[str, list[list[float]]] = field(default_factory=dict)
-    """Corners of the printed tags by number, table frame, m"""
+    """Corners of the printed tags by number, table frame, m."""
     limits: MotionLimits = field(default_factory=MotionLimits)
     pendant: Pendant = field(default_factory=Pendant)
     smoothing: Smoothing = field(default_factory=Smoothing)
-    """Filter of the commands"""
+    """Filter of the commands."""
     operator: str = "person"
-    """Operator that puts the puck on the table: "person" or "lab:PORT" """
+    """Operator who puts the puck on the table, "person" or "lab:PORT"."""
     paddle: Colour | None = None
-    """Colour of the paddle's top, for its detection in videos; None if unknown"""
+    """Colour of the paddle's top, for its detection in videos; None if unknown."""
     made: str = ""
-    """Date of the calibration"""
+    """Date of the calibration."""
 
     def __post_init__(self) -> None:
         check_fields(self, payload=PAYLOADS, latency=(0, 1), readout=(0, 0.1))
@@ -88,7 +89,7 @@ class Rig:
         check_pendant(self.limits, self.pendant)
 
     def robot_config(self, reach: tuple[tuple[float, float], ...]) -> RobotConfig:
-        """Return the configuration of the arm's driver for a seat's reach."""
+        """Return the configuration of the robot client for the workspace of a seat."""
         return RobotConfig(
             host=self.robot,
             mounting=self.mounting,
@@ -101,7 +102,7 @@ class Rig:
         )
 
     def motion_words(self, reach: tuple[tuple[float, float], ...]) -> str:
-        """Return a text for a person: where the paddle may move and how fast."""
+        """Return a text for a person: where the paddle may move, and how fast."""
         (left, low), (right, high) = np.min(reach, 0), np.max(reach, 0)
         stop = LATEST * self.limits.speed + self.limits.stopping_distance
         return (
@@ -131,14 +132,14 @@ class Rig:
 
     @staticmethod
     def from_fields(path: Path, given: dict[str, Any]) -> Rig:
-        """Return the rig with the fields of a file.
+        """Return the rig with the fields from a file.
 
         Args:
             path: Path of the file, for messages.
             given: Fields by name.
 
         Raises:
-            ValueError: A field is missing or wrong; the message names it.
+            ValueError: A field is missing or wrong. The message names the field.
         """
         try:
             return build(Rig, given)

@@ -1,4 +1,4 @@
-"""Files of rigs: JSON objects with a format and the kind of the rig."""
+"""Files of rigs: JSON objects with the version of the format and the kind of rig."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 FORMAT = 1
-"""Format of the files"""
+"""Version of the file format."""
 WRITERS = {"table": "airhockey calibrate", "hand": "airhockey calibrate --hand"}
-"""Command that writes a rig, by its kind"""
+"""Command that writes a rig, by its kind."""
 
 
 def save_rig(path: Path, kind: str, fields: Mapping[str, Any]) -> None:
@@ -32,26 +32,26 @@ def load_rig(path: Path, kind: str) -> dict[str, Any]:
     """Read the fields of a rig.
 
     Raises:
-        ValueError: The file is missing or no rig, or its format or kind is wrong.
+        ValueError: The file is missing or is not a rig, or its format or kind is wrong.
     """
     try:
         given = json.loads(path.read_text())
     except FileNotFoundError:
         raise ValueError(
-            f"{path}: there is no rig; {WRITERS[kind]} writes one"
+            f"{path}: the file does not exist; {WRITERS[kind]} writes it"
         ) from None
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from error
     except ValueError as error:
         raise ValueError(
-            f"{path}: no rig: a rig is a JSON file; {WRITERS[kind]} writes one "
+            f"{path}: not a rig, expected a JSON file; {WRITERS[kind]} writes one "
             f"({error})"
         ) from error
     return rig_fields(path, given, kind)
 
 
 def rig_fields(path: Path, given: Any, kind: str) -> dict[str, Any]:
-    """Return the fields of the rig in a JSON object of a file.
+    """Return the fields of a rig from the content of its file.
 
     Args:
         path: Path of the file, for messages.
@@ -59,28 +59,30 @@ def rig_fields(path: Path, given: Any, kind: str) -> dict[str, Any]:
         kind: Expected kind of the rig, a key of `WRITERS`.
 
     Raises:
-        ValueError: The content is no rig, or its format or kind is wrong.
+        ValueError: The content is not a rig, or its format or kind is wrong.
     """
     given = dict(given) if isinstance(given, dict) else given
     found = given.pop("format", None) if isinstance(given, dict) else None
     if found is None:
-        raise ValueError(f"{path}: no rig, no format; {WRITERS[kind]} writes one")
+        raise ValueError(
+            f"{path}: not a rig, it has no format; {WRITERS[kind]} writes one"
+        )
     if found != FORMAT:
         raise ValueError(f"{path}: format {found!r}, expected {FORMAT}")
     other = given.pop("kind", "table")
     if other != kind:
         raise ValueError(
-            f"{path}: this is the rig of a {other}, expected that of a {kind}; "
+            f"{path}: the rig of a {other}, expected the rig of a {kind}; "
             f"{WRITERS[kind]} writes one"
         )
     return dict(given)
 
 
 def check_tags(tags: Mapping[str, list[list[float]]]) -> None:
-    """Refuse tags that are not four corners (4, 2), m, by a number.
+    """Check that every tag has a number and four corners (4, 2), m.
 
     Raises:
-        ValueError: They are not.
+        ValueError: A tag has another name or shape.
     """
     for number, corners in tags.items():
         if not number.isdecimal() or np.shape(corners) != (4, 2):

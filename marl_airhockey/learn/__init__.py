@@ -1,1 +1,1 @@
-"""Training of policies by PPO, and what becomes of a run."""
+"""Training of policies, and the folders of training runs."""

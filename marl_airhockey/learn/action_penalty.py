@@ -8,15 +8,16 @@ from marl_airhockey.types import Array
 
 
 class ActionPenalty:
-    """Penalty on changes of the action, on their changes, and on exceeded limits.
+    """Penalty on first and second differences of the action, and on exceeded limits.
 
-    The penalty of a step is ``rate |a - b|^2 + jerk |a - 2 b + c|^2 + cost v``, where
-    a, b and c are this action and the two before it, as fractions of top speed (0
-    before an episode), and v is the sum of exceeded limits, see `limits.VIOLATIONS`.
+    The penalty of a step is ``rate |a - b|^2 + jerk |a - 2 b + c|^2 + cost v``. Here a
+    is the action, and b and c are the two actions before it, divided by the top speed.
+    They are 0 before an episode. v is the sum of exceeded limits, see
+    `limits.VIOLATIONS`.
 
     Args:
         rate: Weight of the squared change of the action.
-        jerk: Weight of its squared second difference.
+        jerk: Weight of the squared second difference of the action.
         cost: Weight of the exceeded limits.
     """
 
@@ -29,9 +30,9 @@ class ActionPenalty:
         """Return the penalties (n,) of a step of n slots.
 
         Args:
-            action: (n, 2) requested actions.
-            violation: (n,) sum of the exceeded limits.
-            ended: (n,) whether the episode ended with this step.
+            action: Requested actions, divided by the top speed, (n, 2).
+            violation: Sum of the exceeded limits, (n,).
+            ended: True where the episode ended with this step, (n,).
         """
         if len(self._last) != len(action):
             self._last, self._before = np.zeros((2, len(action), 2))

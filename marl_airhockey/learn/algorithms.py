@@ -16,22 +16,22 @@ from marl_airhockey.learn.settings import load_config, read_settings
 from marl_airhockey.sim.core.errors import unknown_name
 
 AnyConfig = PPOConfig | OfflineConfig | HindsightConfig
-"""Configuration of a run of any algorithm"""
+"""Configuration of a run of any algorithm."""
 PPO = "ppo"
-"""Default algorithm"""
+"""Name of the default algorithm."""
 PLAYING: dict[str, Callable[[str, Mapping[str, Any]], AnyConfig]] = {
     PPO: preset,
     SAC_HER: hindsight_config,
 }
-"""Makers of configurations of what learns by playing, by algorithm"""
+"""Makers of configurations of algorithms that learn in simulation, by algorithm."""
 APART = ("scenario", "algo", "data")
-"""Fields of configurations that are no settings, as they are arguments"""
+"""Fields of configurations that are arguments instead of settings."""
 KINDS: dict[str, type[AnyConfig]] = {
     PPO: PPOConfig,
     SAC_HER: HindsightConfig,
     **dict.fromkeys(OFFLINE, OfflineConfig),
 }
-"""Classes of configurations, by algorithm"""
+"""Classes of configurations, by algorithm."""
 
 
 def make_config(
@@ -43,24 +43,24 @@ def make_config(
     """Return the configuration of a new run.
 
     Args:
-        algo: name of the algorithm.
-        scenario: its name; "" for that of the recordings.
-        data: recordings and folders of them, for what learns from them.
-        settings: changes of its settings, by name.
+        algo: Name of the algorithm.
+        scenario: Name of the scenario; "" for that of the recordings.
+        data: Recordings, and folders of recordings, for offline algorithms.
+        settings: Changed settings, by name.
 
     Raises:
-        ValueError: an unknown name, a bad setting, data that are missing or that
-            nothing is learned from.
+        ValueError: A name is unknown, a setting is invalid, recordings are missing, or
+            they were given to an algorithm that does not use them.
     """
     for name in APART:
         if name in settings:
-            raise ValueError(f"{name}: it is no setting of a run; name it apart")
+            raise ValueError(f"{name}: this is an argument, not a setting of a run")
     if algo in KINDS:
         _check_settings(algo, settings)
     if algo in OFFLINE:
         if not data:
             raise ValueError(
-                f"data: {algo} learns from recordings; name some with --data"
+                f"data: {algo} learns from recordings; give them with --data"
             )
         named = {"scenario": scenario} if scenario else {}
         return offline_config(algo, data, {**settings, **named})
@@ -68,17 +68,19 @@ def make_config(
         raise ValueError(unknown_name("algo", algo, [*PLAYING, *OFFLINE]))
     if data:
         others = " or ".join(OFFLINE)
-        raise ValueError(f"data: {algo} learns by playing; from data do {others}")
+        raise ValueError(
+            f"data: {algo} learns in simulation and uses no recordings; use {others}"
+        )
     if not scenario:
-        raise ValueError("say which SCENARIO to train")
+        raise ValueError("scenario: none was given; name the SCENARIO to train")
     return PLAYING[algo](scenario, settings)
 
 
 def _check_settings(algo: str, settings: Mapping[str, Any]) -> None:
-    """Refuse settings that only other algorithms have.
+    """Check that an algorithm has the settings.
 
     Raises:
-        ValueError: One of these, with the algorithms.
+        ValueError: Only other algorithms have a setting. The message names them.
     """
     has = {name: {f.name for f in fields(kind)} for name, kind in KINDS.items()}
     for name in settings.keys() - has[algo]:
@@ -92,7 +94,7 @@ def load_any_config(folder: Path) -> AnyConfig:
     """Read the configuration of a run of any algorithm.
 
     Raises:
-        ValueError: see `settings.read_settings`.
+        ValueError: The file is not a valid configuration, see `settings.read_settings`.
     """
     path = folder / "config.toml"
     algo = read_settings(path).get("algo", PPO)

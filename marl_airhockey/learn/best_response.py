@@ -1,4 +1,4 @@
-"""Exploitability of a player: a best response, trained for a fixed budget of steps."""
+"""Exploitability of a player: a best response, trained for a fixed number of steps."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.world.keywords import Keywords
 
 GAMES = 400
-"""Games by which a response is measured"""
+"""Number of games that measure a response."""
 SEED = 4_000_000
-"""Seed of the first of these games"""
+"""Seed of the first of these games."""
 
 
 def best_response(
@@ -27,25 +27,26 @@ def best_response(
     seed: int = 0,
     report: ProgressCallback | None = None,
 ) -> float:
-    """Train a policy against a fixed player and return its score against it.
+    """Train a policy against a fixed player and return its score against the player.
 
-    In half of the games of training the player is slowed down, see
-    `SelfPlayConfig.opponent_speed_range`; the score is against the player as it is.
+    In half of the training games the player is slowed down, see
+    `SelfPlayConfig.opponent_speed_range`. The score is measured at its full speed.
 
     Args:
-        scenario: name of a game of two sides or more.
-        player: a driver's name or a policy's path.
-        steps: steps of single worlds.
-        folder: folder of the run; a run that is there already is not trained again.
-        seed: seed of worlds and network.
-        report: called during training, see `train`.
+        scenario: Name of a game of two or more teams.
+        player: Name of a driver or path of a policy.
+        steps: Number of training steps, summed over all worlds.
+        folder: Folder of the run. A run that exists already is not trained again.
+        seed: Seed of the worlds and of the network.
+        report: Function that is called during training, see `train`.
 
     Returns:
-        The response's share of won games, a draw shared by all sides: of two sides 0.5
-        if training found nothing better than the player, of four 0.25.
+        Share of games that the response won; a draw is shared by all teams. If training
+        found nothing better than the player, the share is 0.5 with two teams and 0.25
+        with four.
 
     Raises:
-        ValueError: the folder holds a run of an older version.
+        ValueError: The folder contains a run of another format.
     """
     if (folder / "state.json").exists():
         load_config(PPOConfig, folder / "config.toml")

@@ -1,4 +1,4 @@
-"""Demonstration of the library: a task is learned, measured and shown."""
+"""Demonstration of the library: learn a task, evaluate the policy and show it."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from marl_airhockey.registry import make_driver
 from marl_airhockey.rollouts.watch import show_episodes
 
 BESIDE = ("still", "random", "striker")
-"""Agents that the learned policy is compared with"""
+"""Drivers that the learned policy is compared with."""
 MOST_STEPS = 2_000_000
-"""Steps of training that a demonstration has unless told otherwise: juggling is learned
-in a quarter of them"""
+"""Default number of training steps of a demonstration, if the preset has more. Juggling
+is learned in a quarter of them."""
 
 
 def run_demo(
@@ -33,13 +33,15 @@ def run_demo(
     """Train, evaluate, and write learning curve, video and report.
 
     Args:
-        scenario: name of the task to learn.
-        out: folder; an earlier demonstration in it is replaced.
-        steps: steps of single worlds; None for the preset's, at most `MOST_STEPS`.
-        report: called during training, see `train`.
+        scenario: Name of the task to learn.
+        out: Folder of the files. The run of an earlier demonstration in it is replaced.
+        steps: Number of training steps, summed over all worlds; None for that of the
+            preset, at most `MOST_STEPS`.
+        report: Function that is called during training, see `train`.
 
     Returns:
-        Results of the learned policy and of `BESIDE`, and the files by name.
+        Results of the learned policy and of `BESIDE`, and the paths of the files by
+        name.
     """
     folder = out / "run"
     if folder.exists():

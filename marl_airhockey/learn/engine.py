@@ -1,4 +1,4 @@
-"""Parts that the engines in one process share: rate, logs, threads."""
+"""Code that the engines in one process share: learning rate, logs and threads."""
 
 from __future__ import annotations
 
@@ -29,21 +29,22 @@ from marl_airhockey.registry import find_backend
 
 
 class AdaptiveRate:
-    """Learning rate that follows the KL divergence of updates and fades to a tenth.
+    """Learning rate that follows the KL divergence of updates and falls to a tenth.
 
-    Above twice the target divergence the rate is divided by 1.5, below half of it
-    multiplied by 1.5 (after Schulman et al., 2017, who adapt their penalty so).
+    If the divergence is above twice its target, the rate is divided by 1.5. If it is
+    below half of the target, the rate is multiplied by 1.5. Schulman et al. (2017)
+    adapt their penalty in the same manner.
 
     Args:
-        config: configuration of the run; gives the target and the rate's bounds.
-        rate: first rate.
+        config: Configuration of the run, with the target and the bounds of the rate.
+        rate: Initial rate.
     """
 
     def __init__(self, config: PPOConfig, rate: float) -> None:
         self.rate, self._config = rate, config
 
     def __call__(self, remaining: float) -> float:
-        """Return the rate when a share ``remaining`` (1 to 0) of training is left."""
+        """Return the rate for a share ``remaining`` (1 to 0) of the training."""
         return self.rate * (0.1 + 0.9 * remaining)
 
     def adapt(self, divergence: float) -> None:
@@ -57,9 +58,10 @@ class AdaptiveRate:
 
 @contextmanager
 def training_threads(count: int) -> Iterator[None]:
-    """Let torch use some threads, and no subnormal numbers, which are slow.
+    """Set the number of torch's threads, and disable subnormal numbers, which are slow.
 
-    The latter is of the whole process, so it must not stay: others count on them.
+    Subnormal numbers are disabled for the whole process. They are enabled again at the
+    end, because other code relies on them.
     """
     torch.set_num_threads(count)
     torch.set_flush_denormal(True)
@@ -70,9 +72,9 @@ def training_threads(count: int) -> Iterator[None]:
 
 
 def end_setup(run: TrainingRun[PPOConfig]) -> None:
-    """Compile what restarts of worlds need, and count the time until now as setup.
+    """Compile the code that resets worlds, and count the time so far as setup.
 
-    Arms are slow to build and compile next to nothing, so they are left alone.
+    Worlds of an arm are slow to build and compile almost no code, so they are skipped.
     """
     if find_backend(run.config.backend).tracks_commands:
         compile_world(run.config.scenario, run.config.training_keywords)
@@ -80,14 +82,14 @@ def end_setup(run: TrainingRun[PPOConfig]) -> None:
 
 
 SUFFIXES = {"torch": ".pt", "sb3": ".zip"}
-"""Ends of the files of weights, by engine"""
+"""File extensions of the weights, by engine."""
 
 
 def initial_weights(config: PPOConfig) -> Path:
-    """Return the file of the weights that a run begins with, the best if there are two.
+    """Return the file of the weights that a run begins with, preferably the best ones.
 
     Raises:
-        ValueError: `init` is no run of the same engine, or one of another format.
+        ValueError: `init` is not a run of the same engine, or has another format.
     """
     run, engine = Path(config.init), config.engine
     if (run / "config.toml").exists():
@@ -95,15 +97,17 @@ def initial_weights(config: PPOConfig) -> Path:
     files = [run / f"{name}{SUFFIXES[engine]}" for name in ("best", "last")]
     path = next((file for file in files if file.exists()), None)
     if path is None:
-        raise ValueError(f"init: {run} is no folder of a run of the engine {engine}")
+        raise ValueError(
+            f"init: {run} is not the folder of a run of the engine {engine}"
+        )
     return path
 
 
 def other_size(path: Path, error: RuntimeError) -> ValueError:
     """Return the error for weights that do not fit the network of a run."""
     return ValueError(
-        f"{path}: its network has another size; it is of another scenario, profile or "
-        f"--hidden ({str(error).splitlines()[-1].strip()})"
+        f"{path}: its network has another size; it was trained with another scenario, "
+        f"profile or --hidden ({str(error).splitlines()[-1].strip()})"
     )
 
 
@@ -111,7 +115,7 @@ def note_step(log: Log, env: SlotEnv) -> None:
     """Log the reward terms of the last step, and scores against opponents.
 
     Raises:
-        ValueError: A reward term is nan; named.
+        ValueError: A reward term is nan. The message names it.
     """
     if bad := [name for name, value in env.last_terms.items() if np.isnan(value)]:
         raise ValueError(f"{env.world.scenario.name}: reward terms {bad} are nan")
@@ -128,13 +132,13 @@ def evaluate_and_record(
     log: Log,
     save: Callable[[str], None],
 ) -> Metrics:
-    """Evaluate a policy in training and keep it; return the evaluation's row.
+    """Evaluate and save a policy in training; return the row of the evaluation.
 
     Args:
-        run: whose folder is kept up to date.
-        make: maker of the policy as a driver, as it is now.
-        log: log of the run.
-        save: writes it under a name, "best" or "last".
+        run: Run whose folder is updated.
+        make: Function that returns the current policy as a driver.
+        log: Log of the run.
+        save: Function that saves the policy under a name, "best" or "last".
     """
     metrics = evaluate_policy(make, run.config)
     for name, value in metrics.items():
@@ -149,14 +153,14 @@ def save_weights(
     optimizer: torch.optim.Optimizer,
     policy: NumpyPolicy,
 ) -> None:
-    """Write a policy, and under "last" all that a run goes on from.
+    """Save a policy and its weights, and under "last" the optimizer in addition.
 
     Args:
-        folder: of the run.
-        name: "best" or "last".
-        model: whose weights are kept.
-        optimizer: of the model.
-        policy: the model's, as it is now.
+        folder: Folder of the run.
+        name: Name of the files, "best" or "last".
+        model: Model whose weights are saved.
+        optimizer: Optimizer of the model.
+        policy: Current policy of the model.
     """
     save_state(folder, name, model, optimizer)
     policy.save(folder / f"{name}.npz")
@@ -165,7 +169,7 @@ def save_weights(
 def save_state(
     folder: Path, name: str, model: torch.nn.Module, optimizer: torch.optim.Optimizer
 ) -> None:
-    """Write weights under a name, and under "last" the optimizer, too."""
+    """Save weights under a name, and under "last" the optimizer in addition."""
     draft = folder / f"part-{name}.pt"
     state: dict[str, Any] = {"model": model.state_dict()}
     if name == "last":
@@ -175,10 +179,10 @@ def save_state(
 
 
 def load_state(path: Path) -> dict[str, Any]:
-    """Read what `save_state` wrote; no code in it is run.
+    """Read a file that `save_state` wrote, without running code in it.
 
     Raises:
-        ValueError: It is missing or damaged; names the file.
+        ValueError: The file is missing or damaged. The message names it.
     """
     try:
         found: dict[str, Any] = torch.load(path, weights_only=True)

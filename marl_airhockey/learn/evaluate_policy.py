@@ -1,4 +1,4 @@
-"""Evaluation of a policy in training: success at a task, scores in games."""
+"""Evaluation of a policy in training: success in a task, scores in a game."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.world.keywords import Keywords
 
 EVAL_SEED = 1_000_000
-"""First seed of the evaluations during training"""
+"""First seed of the evaluations during training."""
 Metrics = dict[str, float]
-"""Named numbers; the first is the primary metric, ``return`` breaks ties"""
+"""Numbers by name. The first one is the primary metric; ``return`` breaks ties."""
 DriverFactory = Callable[[bool], Driver]
-"""Maker of the policy as a driver that acts by its mean (True) or samples (False)"""
+"""Function that returns the policy as a driver, which uses the mean action if the
+argument is True and sampled actions if it is False."""
 
 
 def evaluate_policy(make: DriverFactory, config: RunConfig) -> Metrics:
@@ -51,7 +52,7 @@ def _success(make: DriverFactory, config: RunConfig) -> Metrics:
 
 
 def _scores(make: DriverFactory, config: SelfPlayConfig) -> Metrics:
-    """Return shares of won games, a draw counting half; the ends alternate."""
+    """Return shares of won games, where a draw counts half; the ends alternate."""
     keywords: Keywords = {**config.keywords, "drivers": {}}
     score, margin = play_against(
         config.scenario,

@@ -1,4 +1,7 @@
-"""Export of a run's policy as one small file with a card of its origin and quality."""
+"""Export of the policy of a run as one small file with a card.
+
+The card contains the origin of the policy and its measured performance.
+"""
 
 from __future__ import annotations
 
@@ -30,23 +33,25 @@ from marl_airhockey.registry import find_scenario, make_driver
 from marl_airhockey.sim.core.errors import require
 
 EPISODES = 1000
-"""Episodes by which a task's policy is measured"""
+"""Number of episodes that measure the policy of a task."""
 GAMES = 200
-"""Games against each opponent by which a game's policy is measured"""
+"""Number of games against each opponent that measure the policy of a game."""
 
 
 def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> NumpyPolicy:
-    """Write a policy of a run, measured on seeds unseen in training.
+    """Write a policy of a run, measured on seeds that training never uses.
 
     Args:
-        run: folder of a run of `train`.
-        out: the .npz or .onnx to write.
-        checkpoint: one of the run's ``checkpoints``; None for its last policy.
+        run: Folder of a run of `train`.
+        out: Path of the file, which ends in .npz or .onnx.
+        checkpoint: Path of one of the ``checkpoints`` of the run; None for the last
+            policy.
 
     Raises:
-        ValueError: no run, one of an older version, a policy that has no numpy form, or
-            a file of another kind.
-        RuntimeError: onnx is missing, with the line that installs it.
+        ValueError: The folder has no policy, the run has another format, the policy has
+            no NumPy form, or ``out`` has another extension.
+        RuntimeError: onnx is not installed. The message has the command that installs
+            it.
     """
     if out.suffix not in (".npz", ".onnx"):
         raise ValueError(f"out: {out} must end in .npz or .onnx")
@@ -54,7 +59,7 @@ def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> Numpy
         require("onnx", "offline")
     config = load_any_config(run)
     if not (run / "state.json").exists():
-        raise ValueError(f"{run}: there is no policy in it yet; train it first")
+        raise ValueError(f"{run}: the run has no policy yet; train it first")
     progress = Progress.load(run / "state.json")
     last = NumpyPolicy.load(checkpoint) if checkpoint else _load_last(run)
     steps = last.card["steps"] if checkpoint else progress.steps
@@ -90,7 +95,7 @@ def _load_last(run: Path) -> NumpyPolicy:
     """Return the last policy of a run."""
     if not (run / "last.npz").exists():
         raise ValueError(
-            f"{run}: its policy on pixels is a file already: {run / 'last.onnx'}"
+            f"{run}: a policy of pixels is not exported; use {run / 'last.onnx'}"
         )
     return NumpyPolicy.load(run / "last.npz")
 
@@ -132,8 +137,9 @@ def _games(policy: Policy, config: PPOConfig) -> dict[str, Any]:
 def training_command(config: AnyConfig) -> str:
     """Return the command line that trains a configuration again.
 
-    Recordings are named from the working directory on, or by their folders alone if
-    they are elsewhere; all recordings of a named dataset by its name.
+    If all recordings of a named dataset are used, they are given by the name of the
+    dataset. Other recordings are given relative to the working directory, or only by
+    the name of their folder if they are elsewhere.
     """
     algo = PPO if isinstance(config, PPOConfig) else config.algo
     data = config.data if isinstance(config, OfflineConfig) else []
@@ -159,7 +165,7 @@ def training_command(config: AnyConfig) -> str:
 
 
 def _given(data: Sequence[str]) -> list[str]:
-    """Return the names by which recordings are given."""
+    """Return the names by which recordings are given on a command line."""
     found: list[str] = []
     for path in map(Path, data):
         name = dataset_of(path)

@@ -1,4 +1,4 @@
-"""Logs of a run: a CSV file and tensorboard events."""
+"""Logs of a run: a CSV file and events of tensorboard."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 
 class Log(Protocol):
-    """Log that collects values by name; stable-baselines3's `Logger` is one."""
+    """Log that collects values by name, such as `Logger` of stable-baselines3."""
 
     def record(self, key: str, value: float) -> None:
         """Set a value of the next row."""
@@ -20,18 +20,22 @@ class Log(Protocol):
         """Add a value to a mean of the next row."""
 
     def dump(self, step: int) -> None:
-        """Write the next row, at some steps of the run."""
+        """Write the next row.
+
+        Args:
+            step: Number of steps since the beginning of the run.
+        """
 
     def close(self) -> None:
         """Close the files."""
 
 
 def progress_path(folder: Path, steps: int) -> Path:
-    """Return the path of a run's CSV log; a resumed run begins another one.
+    """Return the path of the CSV log of a run; a resumed run begins another file.
 
     Args:
         folder: Folder of the run.
-        steps: Steps done when the process begins.
+        steps: Number of steps of the run when the process begins.
     """
     return folder / (f"progress-{steps}.csv" if steps else "progress.csv")
 
@@ -41,7 +45,7 @@ class RunLog:
 
     Args:
         folder: Folder of the run.
-        steps: Steps done when the process begins.
+        steps: Number of steps of the run when the process begins.
     """
 
     def __init__(self, folder: Path, steps: int) -> None:
@@ -62,7 +66,7 @@ class RunLog:
         self._sums[key] = total + value, count + 1
 
     def dump(self, step: int) -> None:
-        """Write the next row, at some steps of the run, to both."""
+        """Write the next row to the CSV file and to tensorboard."""
         means = {key: total / count for key, (total, count) in self._sums.items()}
         row = {"steps": step, **dict(sorted({**self._values, **means}.items()))}
         for key, value in row.items():
@@ -73,7 +77,7 @@ class RunLog:
         self._sums.clear()
 
     def _write(self, row: dict[str, float]) -> None:
-        """Append a row; with a new column, write all rows again."""
+        """Append a row; if it has a new column, write all rows again."""
         self._rows.append(row)
         fresh = [key for key in row if key not in self._columns]
         self._columns += fresh

@@ -1,4 +1,7 @@
-"""Input layer of the networks of stable-baselines3; models pickle it by this name."""
+"""Input layer of the networks of stable-baselines3.
+
+Saved models refer to the class by the name of this module.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,12 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 
 class FixedScale(BaseFeaturesExtractor):
-    """Input layer ``(observation - centre) / unit``, by the observables' typical sizes.
+    """Input layer ``(observation - centre) / unit`` with fixed centre and unit.
 
     Args:
         observation_space: Box (D,), or the Dict of goals="dict".
-        centre: Centre (D,) of the flat observation.
-        unit: Typical size (D,) of its difference from the centre.
+        centre: Centre of the flat observation, (D,).
+        unit: Typical size of its difference from the centre, (D,).
     """
 
     def __init__(
@@ -34,7 +37,7 @@ class FixedScale(BaseFeaturesExtractor):
     def forward(
         self, observations: torch.Tensor | dict[str, torch.Tensor]
     ) -> torch.Tensor:
-        """Return (B, size): the flat part scaled, then goals as they are."""
+        """Return the scaled flat part, followed by the unscaled goals, (B, size)."""
         if isinstance(observations, torch.Tensor):
             return (observations - self.centre) * self.rate
         flat = (observations["observation"] - self.centre) * self.rate

@@ -1,4 +1,4 @@
-"""Networks of our own learners: a Gaussian actor, with a critic, twin critics."""
+"""Networks of the library's own learners: Gaussian actor, critic, pairs of critics."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.torch_weights import policy_of_weights
 
 HALF_LOG_TAU = 0.9189385332046727
-"""ln(2 pi) / 2, of the normal density"""
+"""ln(2 pi) / 2, a term of the normal log density."""
 
 
 def linear_layers(widths: Sequence[int], gain: float) -> nn.Sequential:
-    """Return linear layers with rectifiers between them, initialized orthogonally.
+    """Return linear layers with ReLUs between them, initialized orthogonally.
 
     Args:
         widths: Widths of the input and of the layers.
-        gain: Gain of the last layer; that of the others suits rectifiers.
+        gain: Gain of the last layer. The other layers have the gain for ReLUs.
     """
     parts: list[nn.Module] = []
     last = len(widths) - 2
@@ -35,20 +35,20 @@ def linear_layers(widths: Sequence[int], gain: float) -> nn.Sequential:
 
 @torch.no_grad()
 def move_toward(target: nn.Module, source: nn.Module, share: float) -> None:
-    """Move the parameters of a target network toward those of its source."""
+    """Move the parameters of a target network toward those of its source by a share."""
     pairs = zip(target.parameters(), source.parameters(), strict=True)
     for ours, theirs in pairs:
         ours.lerp_(theirs, share)
 
 
 class GaussianActor(nn.Module):
-    """Actor whose actions are normal about a mean, after a fixed scaling of the input.
+    """Actor with normally distributed actions and a fixed scaling of its input.
 
     Args:
         hidden: Widths of the hidden layers.
         log_std: Initial log standard deviation of the actions.
-        centre: Centre (D,) of the observation.
-        unit: Typical size (D,) of its difference from the centre.
+        centre: Centre of the observation, (D,).
+        unit: Typical size of its difference from the centre, (D,).
     """
 
     def __init__(
@@ -63,11 +63,11 @@ class GaussianActor(nn.Module):
         self.log_std = nn.Parameter(torch.full((2,), log_std))
 
     def scaled(self, observation: Tensor) -> Tensor:
-        """Return observations (n, D) as the layers take them."""
+        """Return observations (n, D) in the scale of the layers' input."""
         return (observation - self.centre) / self.unit
 
     def log_density(self, mean: Tensor, action: Tensor) -> Tensor:
-        """Return the log density (n,) of actions (n, 2) about their means."""
+        """Return the log density (n,) of actions (n, 2) with given means (n, 2)."""
         gap = (action - mean) * torch.exp(-self.log_std)
         return (-0.5 * gap * gap - self.log_std - HALF_LOG_TAU).sum(-1)
 
@@ -83,7 +83,7 @@ class GaussianActor(nn.Module):
 
 
 class ActorCritic(GaussianActor):
-    """Actor and critic that share no layer; arguments as of `GaussianActor`."""
+    """Actor and critic that share no layer; `GaussianActor` explains the arguments."""
 
     def __init__(
         self, hidden: Sequence[int], log_std: float, centre: Any, unit: Any
@@ -96,9 +96,9 @@ class TwinLayers(nn.Module):
     """Two networks of the same widths, computed in one call.
 
     Args:
-        widths: Widths of the input and the hidden layers, and 1.
-        normalized: Whether the output of each hidden layer is normalized over its
-            units, without learned factors (Ba, Kiros and Hinton, 2016).
+        widths: Widths of the input and of the hidden layers, followed by 1.
+        normalized: True to normalize the output of each hidden layer over its units,
+            without learned factors (Ba, Kiros and Hinton, 2016).
     """
 
     def __init__(self, widths: Sequence[int], normalized: bool = False) -> None:
@@ -117,7 +117,7 @@ class TwinLayers(nn.Module):
         )
 
     def forward(self, x: Tensor) -> Tensor:
-        """Return (2, n) values of inputs (n, D)."""
+        """Return the values (2, n) of inputs (n, D)."""
         x = x.expand(2, *x.shape)
         last = len(self.weights) - 1
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):

@@ -1,4 +1,4 @@
-"""Policies in the ONNX format, which robots' runtimes and other languages read."""
+"""Policies in the ONNX format, which many runtimes and programming languages read."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.onnx import ONNX_CARD
 
 OPSET = 17
-"""Version of the operators, which runtimes from 2022 on know"""
+"""Version of the operators, which runtimes from 2022 or later support."""
 
 
 class Graph:
@@ -44,7 +44,7 @@ class Graph:
         """Write the model of a policy; the file is replaced atomically.
 
         Args:
-            last: Name of the value that is its action before it is clipped.
+            last: Name of the value that is the action before clipping.
             shape: Shape of an observation.
             card: Card of the policy.
             path: Path of the file.
@@ -71,9 +71,10 @@ class Graph:
 def save_onnx(policy: NumpyPolicy, path: Path) -> None:
     """Write a policy as an ONNX model.
 
-    Its input ``observation`` is (B, D) float32, goals that are given apart after the
-    rest; its output ``action`` is (B, 2) float32, the mean action within -1 .. 1.
-    The policy's card is the model's metadata ``card``, as JSON.
+    The input ``observation`` is (B, D) float32. Goals of goals="dict" follow the flat
+    observation. The output ``action`` is (B, 2) float32, the mean action clipped to -1
+    .. 1. The card of the policy is stored as JSON in the metadata ``card`` of the
+    model.
     """
     graph = Graph()
     x = graph.node("Sub", "observation", graph.constant("centre", policy.centre))

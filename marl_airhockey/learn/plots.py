@@ -20,13 +20,13 @@ def plot_learning_curve(
     title: str,
     path: Path,
 ) -> None:
-    """Draw success against CPU-seconds of training, others' success as lines.
+    """Plot success against CPU-seconds of training, with baselines as lines.
 
     Args:
-        rows: rows of ``evaluations.csv``.
-        floors: success of other drivers, by name.
-        title: title of the plot.
-        path: PNG to write.
+        rows: Rows of ``evaluations.csv``.
+        floors: Success of other drivers, by name.
+        title: Title of the plot.
+        path: Path of the PNG file.
     """
     figure, axes = plt.subplots(figsize=(7.2, 4.2), dpi=DPI, layout="constrained")
     cpu = [0.0, *(float(row["learning_cpu_seconds"]) for row in rows)]
@@ -52,11 +52,12 @@ def plot_learning_curve(
 def plot_seed_curves(
     runs: Mapping[str, Sequence[Sequence[Mapping[str, str]]]], path: Path
 ) -> None:
-    """Draw success against CPU-seconds, a panel for each task, by `plot_iqm`.
+    """Plot success against CPU-seconds, with one panel per task drawn by `plot_iqm`.
 
     Args:
-        runs: rows of each seed, by task: ``cpu_seconds`` of learning and ``success``.
-        path: PNG to write.
+        runs: Rows of each seed, by task, with ``cpu_seconds`` of learning and
+            ``success``.
+        path: Path of the PNG file.
     """
     across = min(5, len(runs))
     down = -(-len(runs) // across)
@@ -89,7 +90,7 @@ def plot_seed_curves(
 
 
 def plot_iqm(axes: Axes, x: Array, runs: Array, ink: str, label: str = "") -> None:
-    """Draw the interquartile mean of runs (runs, points) and its 95 % interval."""
+    """Plot the interquartile mean of runs (runs, points) and its 95 % interval."""
     points = np.asarray(runs).T
     middle = [iqm(point) for point in points]
     low, high = np.transpose([bootstrap(point, resamples=400) for point in points])

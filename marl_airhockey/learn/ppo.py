@@ -1,8 +1,9 @@
 """Engine "torch": PPO in plain torch over B worlds in one process, in one file.
 
-The algorithm is that of Schulman et al. (2017) as stable-baselines3 has it: the same
-losses, advantages and time limits, the same adaptive rate, so presets serve both.
-What is left out is what surrounds it there, which costs a third of the CPU time.
+The algorithm is that of Schulman et al. (2017) as in stable-baselines3: the losses, the
+advantages, the treatment of time limits and the adaptive learning rate are the same, so
+presets are valid for both engines. This file omits the other parts of that library,
+which take a third of the CPU time.
 """
 
 from __future__ import annotations
@@ -39,26 +40,27 @@ from marl_airhockey.policies.policy import policy_driver
 VALUE_WEIGHT = 0.5
 """Weight of the critic's squared error in the loss."""
 MASTERED, FEWEST_EPISODES, WIDER = 0.8, 20, 0.05
-"""Success in the episodes of a rollout, and their number, that widen a curriculum's
-ranges of starts, and by how much."""
+"""Conditions and step of a curriculum. Its ranges of starts widen by `WIDER` if at
+least `FEWEST_EPISODES` episodes of a rollout end with a success of at least
+`MASTERED`."""
 
 
 @dataclass
 class Rollout:
-    """Steps of all slots between two updates, (T, n, ...) each."""
+    """Steps of all slots between two updates; tensors are (T, n, ...)."""
 
     observation: Tensor
-    """Scaled"""
+    """Scaled observations."""
     action: Tensor
     density: Tensor
-    """Log density of the actions"""
+    """Log density of the actions."""
     reward: Tensor
     not_done: Tensor
-    """0 where an episode ended with the step, else 1"""
+    """0 where an episode ended with the step, else 1."""
     truncated: list[tuple[int, int, Any]]
-    """Step, slot and last observation of episodes that the clock ended"""
+    """Step, slot and last observation of the episodes that were truncated."""
     success: list[bool]
-    """Success of the episodes that ended"""
+    """Success of the episodes that ended."""
 
 
 def generalized_advantage(
@@ -72,12 +74,12 @@ def generalized_advantage(
     """Return generalized advantage estimates (T, n) (Schulman et al., 2016).
 
     Args:
-        reward: (T, n).
-        value: (T, n) critic's value of the observation before each step.
-        last_value: (n,) critic's value of the observation after the last step.
-        not_done: (T, n) 0 where an episode ended with the step, else 1.
+        reward: Rewards of the steps, (T, n).
+        value: Critic's values of the observations before the steps, (T, n).
+        last_value: Critic's values of the observations after the last step, (n,).
+        not_done: 0 where an episode ended with the step, else 1, (T, n).
         gamma: Discount factor.
-        gae_lambda: Factor between one-step errors (0) and whole returns (1).
+        gae_lambda: Lambda; 0 gives one-step errors, 1 gives whole returns.
     """
     advantage, running = torch.empty_like(value), torch.zeros_like(last_value)
     for t in range(len(value) - 1, -1, -1):
@@ -88,10 +90,10 @@ def generalized_advantage(
 
 
 class Trainer:
-    """PPO of one run.
+    """PPO trainer of a run.
 
     Args:
-        run: whose folder is kept up to date.
+        run: Run whose folder is updated.
     """
 
     def __init__(self, run: TrainingRun[PPOConfig]) -> None:
@@ -136,7 +138,7 @@ class Trainer:
         return steps, self._rate.rate
 
     def _widen(self, success: list[bool]) -> None:
-        """Widen the ranges of starts of a curriculum where they are mastered."""
+        """Widen the ranges of starts of a curriculum after a successful rollout."""
         if not self._config.curriculum:
             return
         progress = self._run.progress
@@ -229,7 +231,7 @@ class Trainer:
         advantage: Tensor,
         returns: Tensor,
     ) -> float:
-        """Descend once on a part of a rollout; return its KL divergence."""
+        """Make one gradient step on a minibatch; return its KL divergence."""
         model, clip = self.model, self._config.clip_range
         change = model.log_density(model.actor(observation), action) - density
         ratio = change.exp()
@@ -237,7 +239,7 @@ class Trainer:
         clipped = ratio.clamp(1.0 - clip, 1.0 + clip)
         loss = -torch.min(ratio * advantage, clipped * advantage).mean()
         error = nn.functional.mse_loss(model.critic(observation)[:, 0], returns)
-        # The entropy of a normal law is its log deviation and a constant.
+        # The entropy of a normal distribution is its log deviation plus a constant.
         loss = loss + VALUE_WEIGHT * error - self._config.ent_coef * model.log_std.sum()
         self._optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
@@ -250,14 +252,14 @@ class Trainer:
         return self.model.to_numpy({**card, "steps": self._run.progress.steps})
 
     def _snapshot(self) -> None:
-        """Add the learner to the opponents of self-play when it is time."""
+        """Add the learner to the pool of opponents if a snapshot is due."""
         env, steps = self._env, self._run.progress.steps
         if isinstance(env, SelfPlayEnv) and steps >= self._snapshot_due:
             env.snapshot(self._policy(), steps)
             self._snapshot_due += self._config.total_steps // self._config.snapshots
 
     def _evaluate(self) -> Metrics:
-        """Evaluate and save the policy; return the evaluation's row."""
+        """Evaluate and save the policy; return the row of the evaluation."""
         run, policy = self._run, self._policy()
         make = partial(policy_driver, policy, "training")
         row = evaluate_and_record(run, make, self._log, self._save)
@@ -266,12 +268,12 @@ class Trainer:
         return row
 
     def _save(self, name: str) -> None:
-        """Write the policy, and all that it goes on from, under a name."""
+        """Save the policy and everything that a resumed run needs, under a name."""
         parts = self.model, self._optimizer, self._policy()
         save_weights(self._run.folder, name, *parts)
 
     def _load(self, path: Path, whole: bool) -> None:
-        """Read weights, and for the same run the optimizer; no code in it is run."""
+        """Read weights and, with ``whole``, the optimizer; run no code in the file."""
         state = load_state(path)
         try:
             self.model.load_state_dict(state["model"])
@@ -282,6 +284,6 @@ class Trainer:
 
 
 def train_with_torch(run: TrainingRun[PPOConfig]) -> Metrics:
-    """Train a run from where it stands to its end; return the last evaluation."""
+    """Train a run to its end, or resume it; return the last evaluation."""
     with training_threads(run.config.torch_threads):
         return Trainer(run).train()

@@ -17,12 +17,10 @@ from marl_airhockey.sim.core.profiles import SUFFIX, find_profile
 
 @dataclass(frozen=True, kw_only=True)
 class PPOConfig(SelfPlayConfig):
-    """Settings of a PPO run; the fields are the options of ``--set``.
-
-    Its ``total_steps`` are of single worlds, summed over all worlds.
+    """Settings of a PPO run, which ``--set`` changes.
 
     Raises:
-        ValueError: A value that makes no sense, named.
+        ValueError: A setting is invalid. The message names it.
     """
 
     MAY_BE_ZERO: ClassVar[tuple[str, ...]] = (
@@ -32,53 +30,66 @@ class PPOConfig(SelfPlayConfig):
         "ent_coef",
         "log_std_init",
     )
+    """Names of the number settings that may be 0."""
     engine: str = "torch"
-    """"torch" or "sb3" in this process, or "rllib" over many."""
+    """Implementation: "torch" or "sb3" in this process, or "rllib" in many
+    processes."""
     num_env_runners: int = 0
-    """Number of processes in which rllib steps worlds; 0 for the learner's"""
+    """Number of processes in which rllib steps worlds, a divisor of ``num_worlds``; 0
+    for the process of the learner. Other engines only have 0."""
     init: str = ""
-    """Folder of a run of the same engine and network size, to begin with its weights"""
+    """Folder of a run of the same engine and network size whose weights the training
+    begins with; "" for new weights. Not with rllib."""
     curriculum: float = 0.0
-    """Share of the ranges of starts and goals, about their middles, with which training
-    begins; they widen as it succeeds. 0: whole from the beginning. Engine torch"""
+    """Share of the ranges of starts and goals, around their middles, with which
+    training begins, 0 to 1. The ranges widen with the success. 0 for the whole ranges.
+    Only for tasks with the engine torch."""
     n_steps: int
-    """Steps of each world in a rollout"""
+    """Number of steps of each world in a rollout, above 0. ``batch_size`` has to divide
+    the number of steps of all learners in a rollout."""
     n_epochs: int
-    """Epochs of gradient descent on a rollout"""
+    """Number of epochs of gradient descent on a rollout, above 0."""
     max_learning_rate: float
-    """Highest learning rate, to which a low KL divergence raises it"""
+    """Highest learning rate, to which a low KL divergence increases it, above 0."""
     target_kl: float
-    """KL divergence; the rate is lowered above twice it, raised below half of it"""
+    """Target of the KL divergence, above 0. The learning rate is decreased if the
+    divergence is above twice the target, and increased if it is below half of it."""
     gae_lambda: float
+    """Lambda of generalized advantage estimation, above 0; 1 for whole returns."""
     clip_range: float
+    """Largest deviation of the probability ratio from 1 in the clipped loss, above
+    0."""
     ent_coef: float
+    """Weight of the entropy of the actions in the loss; 0 for none."""
     max_grad_norm: float
+    """Norm to which gradients are clipped, above 0."""
     log_std_init: float
+    """Initial log standard deviation of the actions, any number."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.engine != "sb3" and self.needs_sb3(self.observe, self.options):
             raise ValueError(
-                f"engine: {self.engine} learns from flat observations; take sb3 for "
+                f"engine: {self.engine} learns from flat observations; use sb3 for "
                 'observe="pixels" and goals="dict"'
             )
         if not 0 <= self.curriculum <= 1:
             raise ValueError(f"curriculum: {self.curriculum} must be in 0 .. 1")
         if self.curriculum and (self.engine != "torch" or self.self_play):
-            raise ValueError("curriculum: only tasks on the engine torch have one")
+            raise ValueError("curriculum: only tasks with the engine torch have one")
         if self.engine == "rllib":
             self._check_rllib()
         elif self.num_env_runners:
-            raise ValueError("num_env_runners: only the engine rllib has runners")
+            raise ValueError("num_env_runners: only the engine rllib has env runners")
         if self.rollout % self.batch_size:
             raise ValueError(
-                f"batch_size: {self.batch_size} must divide n_steps x learners in "
-                f"num_worlds worlds, {self.rollout}"
+                f"batch_size: {self.batch_size} must divide the steps of a rollout, "
+                f"n_steps times the learners in num_worlds worlds, {self.rollout}"
             )
 
     @staticmethod
     def needs_sb3(observe: str, options: Mapping[str, Any]) -> bool:
-        """Return True if only the engine sb3 learns from observations of a form."""
+        """Return True if only the engine sb3 learns from an observation type."""
         return observe == "pixels" or options.get("goals") == "dict"
 
     def _check_rllib(self) -> None:
@@ -92,23 +103,23 @@ class PPOConfig(SelfPlayConfig):
 
     @property
     def rollout(self) -> int:
-        """Number of steps between two updates; training ends with a whole one."""
+        """Number of steps between two updates. Training ends with a whole rollout."""
         return self.n_steps * self.slots
 
 
 def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> PPOConfig:
-    """Return the preset of a scenario with changes on top.
+    """Return the preset of a scenario with changed settings.
 
     Raises:
-        ValueError: an unknown scenario or field, or a bad value.
+        ValueError: A scenario or a setting is unknown, or a setting is invalid.
     """
     if not isinstance(scenario, str):
         raise ValueError(
-            "scenario: a run is resumed by its name; put the class into a "
-            'file and give "my_task.py", "my_task.py:Class" or "package.module:Class"'
+            "scenario: a resumed run needs its name; put the class into a file "
+            'and give "my_task.py", "my_task.py:Class" or "package.module:Class"'
         )
     place, colon, name = scenario.partition(":")
-    if place.endswith(".py"):  # A run goes on from any folder.
+    if place.endswith(".py"):  # A run can be resumed from any working directory.
         scenario = f"{Path(place).expanduser().resolve()}{colon}{name}"
     changes = changes or {}
     game = find_scenario(scenario, **changes.get("options", {}))
@@ -117,7 +128,7 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> PPOConfig
     for agent, driver in changes.get("drivers", {}).items():
         if not isinstance(driver, str):
             raise ValueError(
-                f"drivers: {agent}: a run is resumed by the names of its drivers; "
+                f"drivers: {agent}: a resumed run needs the names of its drivers; "
                 "give a name, a path or code such as my_driver.py"
             )
     check_names(PPOConfig, changes)
@@ -140,17 +151,18 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> PPOConfig
 
 
 EVALUATION_SHARE = 0.2
-"""Most CPU time of a game's evaluations, as a share of that of learning"""
+"""Largest CPU time of the evaluations of a game, as a share of that of learning."""
 EVALUATION_COST = 1.5
-"""CPU time of a control step of an evaluation's game, in steps of learning"""
+"""CPU time of a control step in an evaluation of a game, in steps of learning."""
 FEWEST_GAMES = 20
-"""Games against each opponent below which there are fewer evaluations instead"""
+"""Number of games against each opponent below which the number of evaluations is
+reduced instead."""
 
 
 def _evaluations(config: PPOConfig, changes: Mapping[str, Any]) -> tuple[int, int]:
-    """Return number and games of the evaluations that a game's training can afford.
+    """Return number and size of the evaluations that fit the training of a game.
 
-    What is set stays as it is. A task's episodes are short and need no bound.
+    Settings that were given are not changed. Tasks have short episodes and no limit.
     """
     number, each = config.evaluations, config.eval_episodes
     if not config.self_play:
@@ -166,8 +178,8 @@ def _evaluations(config: PPOConfig, changes: Mapping[str, Any]) -> tuple[int, in
 
 
 def _lags(profile: str) -> dict[str, Any]:
-    """Return a servo's lag from none to the profile's longest.
+    """Return the range of a servo's lag, from none to the longest of the profile.
 
-    So a policy plays on arms that lag less as well, the simulated one among them.
+    The policy can then also control arms that lag less, such as the simulated arm.
     """
     return {"servo_time": [0.0, find_profile(profile).ranges["servo_time"][1]]}

@@ -1,9 +1,9 @@
 """Engine "rllib": PPO of Ray, with worlds stepped in any number of processes.
 
-It runs on a local Ray, or on the cluster that ``RAY_ADDRESS`` names. Each env runner
-steps its share of the worlds as one batch and returns an episode chunk for each of its
-slots. Unlike in the engine "sb3", the learning rate fades on a fixed schedule and every
-runner has its own pool of the learner's snapshots.
+It runs on a local Ray, or on the cluster in ``RAY_ADDRESS``. Each env runner steps its
+share of the worlds as one batch and returns chunks of episodes for each of its slots.
+There are two differences from the engine "sb3": the learning rate falls on a fixed
+schedule, and each runner has its own pool of the learner's snapshots.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from marl_airhockey.policies.policy import policy_driver
 
 
 def build_algorithm(config: PPOConfig, folder: Path, begun: bool = False) -> PPO:
-    """Build RLlib's PPO for a configuration; Ray must run.
+    """Build the PPO of RLlib for a configuration; Ray must be running.
 
     Args:
-        config: configuration of the run.
-        folder: folder of the run.
-        begun: True if the run is resumed: worlds then get other seeds.
+        config: Configuration of the run.
+        folder: Folder of the run.
+        begun: True if the run is resumed, so that worlds have other seeds.
     """
     probe = make_training_env(config, 1 if not config.self_play else 2, folder / "pool")
     layout = probe.world.observer.layout
@@ -85,7 +85,7 @@ def build_algorithm(config: PPOConfig, folder: Path, begun: bool = False) -> PPO
 
 
 def start_ray(runners: int) -> None:
-    """Join the cluster of ``RAY_ADDRESS``, or start a small local Ray."""
+    """Join the cluster in ``RAY_ADDRESS``, or start a small local Ray."""
     if ray.is_initialized():
         return
     if "RAY_ADDRESS" in os.environ:
@@ -94,7 +94,7 @@ def start_ray(runners: int) -> None:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     ray.init(
         address="local",
-        # Each runner counts as a CPU; there may be more of them than cores.
+        # Each runner counts as a CPU, and there may be more runners than cores.
         num_cpus=max(os.cpu_count() or 1, runners + 1),
         include_dashboard=False,
         object_store_memory=400_000_000,
@@ -105,15 +105,15 @@ def start_ray(runners: int) -> None:
 
 
 def _algorithm_state(run: TrainingRun[PPOConfig]) -> Path:
-    """Return the folder of the algorithm's state at the steps of ``state.json``.
+    """Return the folder of the algorithm's state at the steps in ``state.json``.
 
-    Folders of other steps are leftovers of a killed process.
+    Folders of other steps remain from a killed process.
     """
     return (run.folder / f"rllib-{run.progress.steps:012d}").resolve()
 
 
 def train_with_rllib(run: TrainingRun[PPOConfig]) -> Metrics:
-    """Train a run from where it stands to its end; return the last evaluation."""
+    """Train a run to its end, or resume it; return the last evaluation."""
     config, folder, progress = run.config, run.folder, run.progress
     torch.set_num_threads(config.torch_threads)
     start_ray(config.num_env_runners)
@@ -130,7 +130,7 @@ def train_with_rllib(run: TrainingRun[PPOConfig]) -> Metrics:
 
     def advance() -> tuple[int, float]:
         sampled = algo.train().get("env_runners", {})
-        if config.num_env_runners:  # Other processes, whose time is not of this one.
+        if config.num_env_runners:  # The time of other processes is added.
             progress.learning_cpu_seconds += float(sampled.get(RUNNER_CPU, 0.0))
         steps = int(sampled.get("num_env_steps_sampled", 0))
         return progress.steps + steps, config.learning_rate

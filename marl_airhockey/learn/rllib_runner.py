@@ -1,4 +1,4 @@
-"""Networks and env runner of the engine "rllib"."""
+"""Network and env runner of the engine "rllib"."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.types import Array
 
 RUNNER_CPU = "runner_cpu_seconds"
-"""Name of the metric: CPU time of the env runners, s"""
+"""Name of the metric with the CPU time of the env runners, s."""
 
 
 class PolicyModule(TorchRLModule, ValueFunctionAPI):
@@ -54,7 +54,7 @@ class PolicyModule(TorchRLModule, ValueFunctionAPI):
 
 
 class BatchRunner(SingleAgentEnvRunner):
-    """Env runner that steps a batch of worlds; each slot gives chunks of episodes."""
+    """Env runner that steps a batch of worlds; each slot returns chunks of episodes."""
 
     def make_env(self) -> None:
         settings = self.config.env_config
@@ -65,7 +65,7 @@ class BatchRunner(SingleAgentEnvRunner):
             self._train, self._train.num_worlds // shares, pool
         )
         self.num_envs = self.env.num_envs
-        # A runner that replaces a lost one must not repeat its episodes.
+        # A runner that replaces a failed one must not repeat its episodes.
         self.env.seed(time.time_ns() % 2**31 if settings["begun"] else self._seed)
         self._seen: Array = self.env.reset()
         self._shares, self._own_steps, self._due = shares, 0, 0
@@ -76,7 +76,7 @@ class BatchRunner(SingleAgentEnvRunner):
         return {DEFAULT_MODULE_ID: (self.env.observation_space, self.env.action_space)}
 
     def sample(self, **_: Any) -> list[SingleAgentEpisode]:
-        """Step all worlds ``n_steps`` times and return the episodes' chunks."""
+        """Step all worlds ``n_steps`` times and return the chunks of episodes."""
         cpu = time.process_time()
         self._take_snapshot()
         steps, slots = self._train.n_steps, self.num_envs
@@ -127,7 +127,7 @@ class BatchRunner(SingleAgentEnvRunner):
         return episodes
 
     def _take_snapshot(self) -> None:
-        """Add the policy as it is to this runner's pool of opponents if it is due."""
+        """Add the current policy to this runner's pool of opponents if it is due."""
         steps = max(self._own_steps * self._shares, self.num_env_steps_sampled_lifetime)
         if isinstance(self.env, SelfPlayEnv) and steps >= self._due:
             self.env.snapshot(self.module.to_numpy(), steps)
@@ -151,7 +151,7 @@ def _chunk(
     columns: dict[str, Array],
     final: dict[str, Any] | None,
 ) -> SingleAgentEpisode:
-    """Return a chunk of an episode, ended if its last info ``final`` is given."""
+    """Return a chunk of an episode, which has ended if an info ``final`` is given."""
     truncated = final is not None and final["TimeLimit.truncated"]
     return SingleAgentEpisode(
         observations=InfiniteLookbackBuffer(seen),

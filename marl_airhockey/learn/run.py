@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from marl_airhockey.learn.logs import Log
 
 ProgressCallback = Callable[[int, int, Metrics], None]
-"""Function called with steps done, steps in all, and the latest evaluation"""
+"""Function that is called with the finished steps, all steps, and the latest
+evaluation."""
 
 
 Config = TypeVar("Config", bound=RunConfig, covariant=True)
@@ -30,45 +31,46 @@ class Progress:
 
     steps: int = 0
     learning_cpu_seconds: float = 0.0
-    """CPU time of rollouts and updates, those of other processes included"""
+    """CPU time of rollouts and updates, including that of other processes, s."""
     evaluation_cpu_seconds: float = 0.0
-    """CPU time of evaluations and of writing policies"""
+    """CPU time of evaluations and of writing policies, s."""
     setup_cpu_seconds: float = 0.0
-    """CPU time before the first step: compiling, building worlds and networks"""
+    """CPU time before the first step, for compilation and construction of worlds and
+    networks, s."""
     wall_seconds: float = 0.0
     rate: float = 0.0
     start_spread: float = 0.0
-    """Share of the ranges of starts in a curriculum; 0 before its beginning"""
+    """Share of the ranges of starts in a curriculum; 0 before its beginning."""
     best: tuple[float, float] = (-1.0, float("-inf"))
-    """First metric and return of the best evaluation"""
+    """First metric and return of the best evaluation."""
 
     @property
     def cpu_seconds(self) -> float:
-        """All CPU time, s."""
+        """Total CPU time, s."""
         return sum(self.cpu_times.values())
 
     @property
     def cpu_times(self) -> dict[str, float]:
-        """CPU time of each kind, s, by the names of the fields."""
+        """CPU times by the names of their fields, s."""
         fields = vars(self)
         return {name: fields[name] for name in fields if name.endswith("_cpu_seconds")}
 
     def save(self, path: Path) -> None:
-        """Write the file such that a killed process leaves the old or the new one."""
+        """Write the file atomically: a killed process leaves the old or the new one."""
         draft = path.with_suffix(".part")
         draft.write_text(json.dumps({"cpu_seconds": self.cpu_seconds, **vars(self)}))
         draft.replace(path)
 
     @staticmethod
     def load(path: Path) -> Progress:
-        """Read what `save` wrote.
+        """Read a file that `save` wrote.
 
         Raises:
-            ValueError: It is damaged; names the file.
+            ValueError: The file is damaged. The message names it.
         """
         try:
             data = json.loads(path.read_text())
-            data.pop("cpu_seconds")  # The sum of the others, for readers of the file.
+            data.pop("cpu_seconds")  # The sum of the other times.
             return Progress(**{**data, "best": tuple(data["best"])})
         except (KeyError, TypeError, ValueError) as error:
             raise _damaged(path, error) from error
@@ -81,12 +83,12 @@ def _damaged(path: Path, error: Exception) -> ValueError:
 
 
 class TrainingRun(Generic[Config]):
-    """Folder of a run, kept up to date whatever engine trains.
+    """Folder of a run, which every engine updates.
 
     Args:
-        config: configuration of the run.
-        folder: folder of the run; what is there already is continued.
-        report: called during training.
+        config: Configuration of the run.
+        folder: Folder of the run. A run that exists in it is resumed.
+        report: Function that is called during training.
     """
 
     def __init__(
@@ -96,7 +98,7 @@ class TrainingRun(Generic[Config]):
         state = folder / "state.json"
         self.progress = Progress.load(state) if state.exists() else Progress()
         self.latest: Metrics = {}
-        """Last row of ``evaluations.csv``"""
+        """Last row of ``evaluations.csv``."""
         self._every = max(config.total_steps // config.evaluations, 1)
         self._next = (self.progress.steps // self._every + 1) * self._every
         self._table = folder / "evaluations.csv"
@@ -110,13 +112,13 @@ class TrainingRun(Generic[Config]):
             if not state.exists():
                 if rows:
                     raise _damaged(state, FileNotFoundError("it is missing"))
-                self._table.unlink()  # Killed within its first evaluation.
+                self._table.unlink()  # The process was killed in its first evaluation.
                 self.latest = {}
         self._clock = (time.process_time(), time.perf_counter())
 
     @property
     def steps_left(self) -> int:
-        """Number of steps still to be made."""
+        """Number of steps that are left."""
         return self.config.total_steps - self.progress.steps
 
     def train(
@@ -125,14 +127,14 @@ class TrainingRun(Generic[Config]):
         evaluate: Callable[[], Metrics],
         log: Log,
     ) -> Metrics:
-        """Train from where the run is to its end; return the last evaluation.
+        """Train to the end of the run; return the last evaluation.
 
         Args:
-            advance: Function that learns for some steps; it returns the number of steps
+            advance: Function that learns for some steps. It returns the number of steps
                 since the beginning of the run, and the learning rate.
             evaluate: Function that evaluates and saves the policy, see
-                `record_evaluation`; it returns the evaluation's row.
-            log: Log of the run, which is closed in the end.
+                `record_evaluation`. It returns the row of the evaluation.
+            log: Log of the run, which is closed at the end.
         """
         row = self.latest
         try:
@@ -147,22 +149,22 @@ class TrainingRun(Generic[Config]):
         return row
 
     def end_setup(self) -> None:
-        """Count the time until now as setup, what follows as learning."""
+        """Count the time so far as setup, and the following time as learning."""
         self.progress.setup_cpu_seconds += self._cpu_seconds()
 
     def _cpu_seconds(self) -> float:
-        """Return the CPU time since the last call; add the time to that of the run."""
+        """Return the CPU time since the last call, and add the wall time to the run."""
         began = self._clock
         self._clock = (time.process_time(), time.perf_counter())
         self.progress.wall_seconds += self._clock[1] - began[1]
         return self._clock[0] - began[0]
 
     def _update_progress(self, steps: int, rate: float) -> None:
-        """Set the steps done, count the time since the last call as learning.
+        """Set the number of steps, and count the time since the last call as learning.
 
         Args:
-            steps: steps since the beginning of the run.
-            rate: learning rate now, with which a resumed run continues.
+            steps: Number of steps since the beginning of the run.
+            rate: Current learning rate, with which a resumed run continues.
         """
         progress = self.progress
         progress.learning_cpu_seconds += self._cpu_seconds()
@@ -178,8 +180,8 @@ class TrainingRun(Generic[Config]):
         The time since the last step counts as evaluation.
 
         Args:
-            metrics: evaluation of the policy as it is.
-            save: function that writes the policy under a name, "best" or "last".
+            metrics: Evaluation of the current policy.
+            save: Function that saves the policy under a name, "best" or "last".
         """
         progress = self.progress
         progress.evaluation_cpu_seconds += self._cpu_seconds()
@@ -202,7 +204,7 @@ class TrainingRun(Generic[Config]):
         return self.latest
 
     def _write(self, row: Metrics) -> None:
-        """Add a row to the table, such that a killed process leaves whole rows."""
+        """Add a row to the table, so that a killed process leaves whole rows."""
         fresh, draft = not self._table.exists(), self._table.with_suffix(".part")
         if not fresh:
             shutil.copyfile(self._table, draft)
@@ -215,7 +217,7 @@ class TrainingRun(Generic[Config]):
 
     @property
     def checkpoint_path(self) -> Path:
-        """Path of the policy's checkpoint at the present steps; its folder is made."""
+        """Path of the checkpoint at the current steps; its folder is created."""
         folder = self.folder / "checkpoints"
         folder.mkdir(exist_ok=True)
         return folder / f"{self.progress.steps:012d}.npz"

@@ -1,4 +1,4 @@
-"""Settings that every run has, whatever it learns from, and their form as TOML."""
+"""Settings that the runs of all algorithms have, and their TOML form."""
 
 from __future__ import annotations
 
@@ -15,38 +15,53 @@ from marl_airhockey.sim.world.keywords import Keywords
 
 @dataclass(frozen=True, kw_only=True)
 class RunConfig:
-    """Settings of a run.
+    """Settings that the runs of all algorithms have.
 
     Raises:
-        ValueError: a value that makes no sense, named.
+        ValueError: A setting is invalid. The message names it.
     """
 
     MAY_BE_ZERO: ClassVar[tuple[str, ...]] = ("seed",)
-    """Numbers that need not be above 0"""
+    """Names of the number settings that may be 0. All others must be above 0."""
 
     scenario: str
+    """Name of the scenario, or code, see `registry.find_scenario`."""
     seed: int = 0
+    """Seed of the run, 0 or more."""
     backend: str = DEFAULT_BACKEND
+    """Name of the backend."""
     profile: str = "ideal"
+    """Name or file of the profile of sensing and actuation."""
     observe: str = "velocity"
+    """Observation type: "velocity", "estimate", "history" or "pixels"."""
     options: dict[str, Any] = field(default_factory=dict)
-    """Values of the scenario's own fields, by name"""
+    """Options of the scenario, by name."""
     drivers: dict[str, str] = field(default_factory=dict)
-    """Drivers of seats that are not learned, by agent"""
+    """Drivers of seats that are not learned, by agent."""
     physics: dict[str, Any] = field(default_factory=dict)
-    """Physical parameters, by name: numbers or ranges"""
+    """Physics parameters by name: numbers, or ranges that are sampled for each
+    episode."""
     control_dt: float = 0.05
-    """s between two actions; `gamma` is of one of them"""
+    """Time between two actions, s, above 0."""
     total_steps: int
+    """Number of training steps, summed over all worlds, above 0. Offline algorithms
+    count gradient steps."""
     batch_size: int
+    """Number of steps in a minibatch, above 0."""
     learning_rate: float
+    """Initial learning rate, above 0."""
     gamma: float
+    """Discount per control step, above 0 and at most 1."""
     hidden: list[int]
-    """Widths of the hidden layers; networks share none"""
+    """Widths of the hidden layers, at least one, each above 0. Networks share no
+    layers."""
     evaluations: int
-    """Number of evaluations during training"""
+    """Number of evaluations during training, above 0."""
     eval_episodes: int
+    """Number of episodes of each evaluation, or of games against each opponent, above
+    0."""
     torch_threads: int = 1
+    """Number of threads of torch, above 0."""
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -58,7 +73,9 @@ class RunConfig:
         if self.seed < 0:
             raise ValueError(f"seed: {self.seed} must be 0 or more")
         if not self.hidden or any(w < 1 for w in self.hidden):
-            raise ValueError(f"hidden: {self.hidden} must be widths above 0")
+            raise ValueError(
+                f"hidden: {self.hidden} must be one or more widths above 0"
+            )
         if self.gamma > 1.0:
             raise ValueError(f"gamma: {self.gamma} must be in 0 .. 1")
 
@@ -76,10 +93,10 @@ class RunConfig:
         }
 
     def card(self, labels: Sequence[str]) -> dict[str, Any]:
-        """Return the card of a policy of this run: the environment that it needs.
+        """Return the card of a policy of this run, which describes its environment.
 
         Args:
-            labels: Names of the elements of its observations.
+            labels: Names of the elements of the observations.
         """
         return {
             "run_format": RUN_FORMAT,
@@ -89,7 +106,7 @@ class RunConfig:
         }
 
     def to_toml(self) -> str:
-        """Return the configuration as TOML, readable by `settings.load_config`."""
+        """Return the configuration as TOML, which `settings.load_config` reads."""
         lines, tables = [f"format = {RUN_FORMAT}"], []
         for name, value in asdict(self).items():
             if isinstance(value, dict):

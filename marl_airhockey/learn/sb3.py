@@ -34,20 +34,21 @@ from marl_airhockey.policies.policy import Policy
 from marl_airhockey.policies.sb3 import load_weights, numpy_actor
 
 NEVER = 10**9
-"""Rollouts between two rows that a model writes by itself: rows are the run's"""
+"""Number of rollouts between two rows that a model writes automatically. It is large,
+because the run writes the rows."""
 
 
 def train_with_sb3(run: TrainingRun[PPOConfig]) -> Metrics:
-    """Train a run from where it stands to its end; return the last evaluation."""
+    """Train a run to its end, or resume it; return the last evaluation."""
     with training_threads(run.config.torch_threads):
         return SB3Trainer(run).train()
 
 
 class SB3Trainer:
-    """PPO of one run, a rollout at a time.
+    """PPO trainer of a run, which makes one rollout per call.
 
     Args:
-        run: whose folder is kept up to date.
+        run: Run whose folder is updated.
     """
 
     def __init__(self, run: TrainingRun[PPOConfig]) -> None:
@@ -65,7 +66,7 @@ class SB3Trainer:
         # A resumed run must not repeat the episodes of its beginning.
         self._env.seed(config.seed * 10_000 + steps % 9973)
         self._model.set_logger(make_logger(folder, steps))
-        # The first snapshot is due at once: self-play needs an opponent.
+        # The first snapshot is due immediately, because self-play needs an opponent.
         self._snapshot_due = steps
         end_setup(run)
 
@@ -89,12 +90,12 @@ class SB3Trainer:
         return model.num_timesteps, self._rate.rate
 
     def _to_numpy(self) -> NumpyPolicy:
-        """Return the policy as it is."""
+        """Return the current policy."""
         card = {**vars(self._model)["card"], "steps": self._model.num_timesteps}
         return numpy_actor(self._model.policy.state_dict(), card)
 
     def _evaluate(self) -> Metrics:
-        """Evaluate and save the policy; return the evaluation's row."""
+        """Evaluate and save the policy; return the row of the evaluation."""
         run, model = self._run, self._model
         shape, observe = model.observation_space.shape, run.config.observe
         make = partial(Policy, partial(_predict, model), shape, observe, "training")
@@ -113,7 +114,7 @@ class SB3Trainer:
 
 
 def learn_for(model: BaseAlgorithm, steps: int, slots: SlotEnv) -> None:
-    """Let a model learn for more steps, and note each in its log."""
+    """Let a model learn for a number of steps, and log each of them."""
 
     def note(_locals: dict[str, Any], _globals: dict[str, Any]) -> bool:
         note_step(model.logger, slots)
@@ -127,10 +128,10 @@ def _predict(model: PPO, observation: Any, deterministic: bool) -> Any:
 
 
 def _take_weights(model: PPO, path: Path) -> None:
-    """Load weights from a file into a model, its exploration among them.
+    """Load weights from a file into a model, including its exploration.
 
     Raises:
-        ValueError: they are of another size.
+        ValueError: The weights have another size.
     """
     try:
         model.policy.load_state_dict(load_weights(path))
@@ -156,12 +157,12 @@ class _Rows(KVWriter):
 
 
 def make_logger(folder: Path, steps: int) -> Logger:
-    """Return a logger to the files of `logs.RunLog`."""
+    """Return a logger that writes the files of `logs.RunLog`."""
     return Logger(str(folder), [_Rows(RunLog(folder, steps))])
 
 
 def build_model(config: PPOConfig, env: AirHockeyVecEnv) -> PPO:
-    """Build a fresh PPO model for an environment, with its card as ``model.card``."""
+    """Build a new PPO model for an environment, with its card as ``model.card``."""
     layout = env.world.observer.layout
     policy, extra = "MlpPolicy", {}
     if config.observe == "pixels":
@@ -197,6 +198,6 @@ def build_model(config: PPOConfig, env: AirHockeyVecEnv) -> PPO:
             **extra,
         },
     )
-    # SB3 saves it with the model: the file alone says what the policy must see.
+    # SB3 saves the card with the model, so the file describes the observations.
     vars(model)["card"] = config.card(layout.labels)
     return model

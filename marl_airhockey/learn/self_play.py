@@ -18,17 +18,17 @@ from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.types import Array
 
 SCORE_WEIGHT = 0.05
-"""Weight of the latest game in the running score against an opponent"""
+"""Weight of the latest game in the running score against an opponent."""
 
 
 class SelfPlayEnv(SlotEnv):
-    """Slots of the learner: all seats of some worlds, one team in the others.
+    """Slots of the learner: all seats of some worlds, and one team in the other worlds.
 
-    In those others, at every start of an episode, the learner is given a team and all
-    other teams the same opponent. It is sampled from scripts and from the pool
-    of snapshots: the more often the learner loses to one, the more likely (prioritized
-    fictitious self-play; Vinyals et al., 2019). In half of these games it moves at a
-    share of its commanded speed.
+    In the other worlds the learner gets a team at every start of an episode. All other
+    teams get the same opponent, which is sampled from the scripts and from the pool of
+    snapshots. Opponents that the learner loses to are more likely (prioritized
+    fictitious self-play; Vinyals et al., 2019). In half of these games the opponent
+    moves at a share of its commanded speed.
 
     Args:
         config: Settings of the run.
@@ -77,13 +77,13 @@ class SelfPlayEnv(SlotEnv):
         return dict(zip(names, self._scores.tolist(), strict=True))
 
     def snapshot(self, policy: NumpyPolicy, steps: int) -> None:
-        """Add the learner as it is to the pool.
+        """Add the current learner to the pool.
 
-        In a full pool it replaces the snapshot that the learner beats most often.
+        If the pool is full, it replaces the snapshot that the learner beats most often.
 
         Args:
-            policy: the learner.
-            steps: steps of training so far; names the file.
+            policy: Policy of the learner.
+            steps: Number of training steps so far, which is the name of the file.
         """
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"{steps:012d}.npz"
@@ -106,7 +106,7 @@ class SelfPlayEnv(SlotEnv):
         self._begin(np.flatnonzero((self._roster.seated == player).any(-1)))
 
     def _draw(self, count: int) -> Array:
-        """Sample (count,) opponents, by number."""
+        """Sample the indices of opponents, (count,)."""
         config = self._config
         weight = (
             np.maximum(1.0 - self._scores, 0.0) ** config.opponent_sampling_exponent
@@ -121,7 +121,7 @@ class SelfPlayEnv(SlotEnv):
         return self._rng.choice(len(weight), count, p=weight / weight.sum())
 
     def _begin(self, worlds: Array) -> None:
-        """Draw teams and opponents for the episodes that begin in some worlds."""
+        """Sample teams and opponents for the episodes that begin in some worlds."""
         worlds = worlds[worlds >= self._mirrored]
         if not len(worlds) or not len(self._scores):
             return
@@ -141,7 +141,7 @@ class SelfPlayEnv(SlotEnv):
         self._roster.begin(worlds)
 
     def _restarted(self, worlds: Array, last: StepResult) -> None:
-        """Add results against opponents at full pace to their scores; draw new ones."""
+        """Update the scores against opponents at full speed; sample new opponents."""
         seats = self._members[:, 0]
         counted = (worlds >= self._mirrored) & (self._pace[worlds] == 1.0)
         for world in worlds[counted].tolist():
@@ -166,7 +166,7 @@ class SelfPlayEnv(SlotEnv):
         self._begin(np.arange(self.world.num_worlds))
 
     def _of_worlds(self, actions: Array) -> Array:
-        """Return the actions of all seats: the learner's, and those of opponents."""
+        """Return the actions of all seats, those of the learner and of opponents."""
         every = np.zeros((self.world.num_worlds, len(self._teams), 2))
         self._roster.ask(every)
         every *= self._pace[:, None, None]
@@ -175,7 +175,7 @@ class SelfPlayEnv(SlotEnv):
 
 
 def make_training_env(config: SelfPlayConfig, num_worlds: int, pool: Path) -> SlotEnv:
-    """Build the worlds that a configuration is trained in, or a part of them.
+    """Build the worlds of a training, or a part of them.
 
     Args:
         config: Configuration of the run.

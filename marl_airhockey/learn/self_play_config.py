@@ -1,4 +1,4 @@
-"""Settings of the worlds of training, and of self-play in them."""
+"""Settings of the training worlds, and of self-play in them."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ EVAL_OPPONENTS = ("random", "goalkeeper", "striker", "allround")
 
 @dataclass(frozen=True, kw_only=True)
 class SelfPlayConfig(RunConfig):
-    """Settings of a run in many worlds, where a game is learned by self-play.
+    """Settings of a run in many worlds, in which games are learned by self-play.
 
     Raises:
-        ValueError: A value that makes no sense, named.
+        ValueError: A setting is invalid. The message names it.
     """
 
     MAY_BE_ZERO: ClassVar[tuple[str, ...]] = (
@@ -30,6 +30,7 @@ class SelfPlayConfig(RunConfig):
         "self_play_fraction",
         "scripted_fraction",
     )
+    """Names of the number settings that may be 0."""
     SELF_PLAY: ClassVar[tuple[str, ...]] = (
         "self_play_fraction",
         "opponents",
@@ -40,49 +41,52 @@ class SelfPlayConfig(RunConfig):
         "opponent_speed_range",
         "eval_opponents",
     )
-    """Names of the settings of games alone"""
+    """Names of the settings that only games have."""
 
     training_options: dict[str, Any] = field(default_factory=dict)
-    """Values of the scenario's fields in training alone; `options` override them"""
+    """Options of the scenario in training only; ``options`` override them."""
     training_physics: dict[str, Any] = field(default_factory=dict)
-    """Physical parameters in training alone; `physics` override them"""
+    """Physics parameters in training only; ``physics`` override them."""
     num_worlds: int
-    """Number of worlds of training"""
+    """Number of parallel worlds, above 0."""
     action_rate_weight: float = 0.0
-    """Weight of the squared change of the action, subtracted from training rewards"""
+    """Weight of the squared change of the action, which is subtracted from the rewards
+    of the training; 0 for none. Actions are divided by the top speed."""
     action_jerk_weight: float = 0.0
-    """Weight of the squared second difference of the action, likewise"""
+    """Weight of the squared second difference of the action, also subtracted; 0 for
+    none."""
     cost_weight: float = 0.0
-    """Weight of ``cost``, the sum of exceeded limits, likewise"""
+    """Weight of ``cost``, the sum of exceeded limits, also subtracted; 0 for none."""
     self_play_fraction: float = 0.5
-    """Share of the worlds of a game in which the learner plays all seats"""
+    """Share of the worlds of a game in which the learner plays all seats, 0 to 1."""
     opponents: list[str] = field(default_factory=lambda: list(OPPONENTS))
-    """Drivers that the learner plays against in games"""
+    """Drivers that the learner plays against in games."""
     scripted_fraction: float = 0.5
-    """Share of the other worlds' games that are against `opponents`"""
+    """Share of the games in the other worlds that are against ``opponents``, 0 to 1."""
     snapshots: int = 40
-    """Number of times that the learner is added to the pool of opponents"""
+    """Number of times that the learner is added to the pool of opponents, above 0."""
     pool: int = 16
-    """Most snapshots in the pool"""
+    """Largest number of snapshots in the pool, above 0."""
     opponent_sampling_exponent: float = 2.0
-    """Exponent of an opponent's share of won games, by which it is sampled"""
+    """Exponent of an opponent's share of won games in its sampling weight, above 0."""
     opponent_speed_range: list[float] = field(default_factory=lambda: [0.1, 1.0])
-    """Range of the share of their commanded speed at which opponents move in half of
-    the games, so that the learner sometimes scores against good ones"""
+    """Low and high end, 0 to 1, of the share of the commanded speed at which opponents
+    move in half of the games, so that the learner sometimes scores against strong
+    opponents."""
     eval_opponents: list[str] = field(default_factory=lambda: list(EVAL_OPPONENTS))
-    """Drivers that evaluations of games are against"""
+    """Drivers that the learner plays against in evaluations of games."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self._open_teams:
             raise ValueError(
-                f"drivers: every seat of {self.scenario!r} has a driver, so that "
-                "nothing is learned; leave one out"
+                f"drivers: every seat of {self.scenario!r} has a driver, so nothing is "
+                "learned; leave one seat open"
             )
         if self.drivers and self.self_play:
             raise ValueError(
                 f"drivers: self-play needs all seats of {self.scenario!r} open; to "
-                "learn against somebody, fill all seats of the other teams"
+                "learn against a driver, give it all seats of the other teams"
             )
         for name in ("self_play_fraction", "scripted_fraction"):
             if not 0 <= getattr(self, name) <= 1:
@@ -90,12 +94,12 @@ class SelfPlayConfig(RunConfig):
         speeds = self.opponent_speed_range
         if len(speeds) != 2 or not 0 <= speeds[0] <= speeds[1] <= 1:
             raise ValueError(
-                f"opponent_speed_range: {speeds} must be low and high, in 0 .. 1"
+                f"opponent_speed_range: {speeds} must be [low, high] in 0 .. 1"
             )
 
     @cached_property
     def self_play(self) -> bool:
-        """True if seats of more than one team are open: the learner plays them all."""
+        """True if seats of several teams are open; the learner plays all of them."""
         return len(set(self._open_teams)) > 1
 
     @cached_property
@@ -114,7 +118,7 @@ class SelfPlayConfig(RunConfig):
 
     @property
     def training_keywords(self) -> Keywords:
-        """Keywords of the environments of training."""
+        """Keywords of the environments of the training."""
         physics = {**self.training_physics, **self.physics}
         options = {**self.training_options, **self.options}
         return {**self.keywords, "physics": physics, "options": options}

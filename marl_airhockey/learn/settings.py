@@ -1,4 +1,4 @@
-"""Settings of runs in files: read, checked, refused."""
+"""Settings of runs in files: reading and checks."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ C = TypeVar("C", bound=RunConfig)
 
 
 def check_names(kind: type[RunConfig], settings: Mapping[str, Any]) -> None:
-    """Refuse settings that a kind of configuration does not have.
+    """Check that a kind of configuration has the settings.
 
     Raises:
-        ValueError: An unknown name; the message has the known ones.
+        ValueError: A setting is unknown. The message lists the known ones.
     """
     known = [f.name for f in fields(kind)]
     for name in settings:
@@ -34,13 +34,13 @@ def read_settings(path: Path) -> dict[str, Any]:
     """Return the settings in the ``config.toml`` of a run.
 
     Raises:
-        ValueError: Not such a file, one of a run of another format, or one that names
-            Python code and is not trusted.
+        ValueError: The file is not a configuration, the run has another format, or the
+            configuration names Python code that is not trusted.
     """
     try:
         data = tomllib.loads(path.read_text())
     except (OSError, tomllib.TOMLDecodeError) as error:
-        raise ValueError(f"{path} is no training configuration: {error}") from error
+        raise ValueError(f"{path} is not a training configuration: {error}") from error
     found = data.pop("format", 1)
     if "scenario" in data:
         check_run_format(path.parent, found)
@@ -49,26 +49,32 @@ def read_settings(path: Path) -> dict[str, Any]:
 
 
 def load_config(kind: type[C], path: Path) -> C:
-    """Read the configuration that `RunConfig.to_toml` wrote.
+    """Read a configuration that `RunConfig.to_toml` wrote.
 
     Args:
         kind: Class of the configuration.
-        path: Path of a run's ``config.toml``.
+        path: Path of the ``config.toml`` of a run.
 
     Raises:
-        ValueError: See `read_settings`, or a run of another algorithm.
+        ValueError: The file cannot be read, see `read_settings`, or it is the
+            configuration of another algorithm.
     """
     data, names = read_settings(path), {f.name for f in fields(kind)}
     if "algo" in data and "algo" not in names:
-        raise ValueError(f"{path.parent}: a run of {data['algo']}, not of PPO")
+        raise ValueError(f"{path.parent} is a run of {data['algo']}, not of PPO")
     try:
         return build(kind, data)
     except ValueError as error:
-        raise ValueError(f"{path} is no training configuration: {error}") from error
+        raise ValueError(f"{path} is not a training configuration: {error}") from error
 
 
 def _refuse_code(path: Path, data: Mapping[str, Any]) -> None:
-    """Ask before a configuration, maybe somebody else's, runs code that it names."""
+    """Require trust before code is run that a configuration names.
+
+    Raises:
+        ValueError: The user does not trust the configuration, which may be from another
+            person.
+    """
     named = [data.get("scenario", ""), *dict(data.get("drivers", {})).values()]
     named += [*data.get("opponents", []), *data.get("eval_opponents", [])]
     found = [t for t in map(str, named) if runs_code(t) and not is_trusted_code(t)]

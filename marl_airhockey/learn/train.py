@@ -2,7 +2,7 @@
 
 A run is a folder: ``config.toml`` (all settings and the run format), ``versions.json``,
 progress tables and tensorboard events, ``evaluations.csv``, the best and the last
-policy, and ``state.json``, from which a killed run is resumed.
+policy, and ``state.json``, from which an interrupted run is resumed.
 """
 
 from __future__ import annotations
@@ -43,11 +43,12 @@ class TrainingResult:
     """Result of a training run."""
 
     folder: Path
-    """Folder of the run; as a player, its best policy"""
+    """Folder of the run. It can be used as a driver, which is its best policy."""
     steps: int
-    """Steps of single worlds"""
+    """Number of steps, summed over all worlds."""
     metrics: dict[str, float]
-    """Last row of ``evaluations.csv``: "success" or "score", "return" and so on"""
+    """Last row of ``evaluations.csv`` with "success" or "score", "return" and further
+    columns."""
 
     def policy(self, deterministic: bool = True) -> Driver:
         """Return the best policy as a driver."""
@@ -66,21 +67,23 @@ def train(
     """Train a policy with PPO and the preset of a scenario, or by another algorithm.
 
     Args:
-        scenario: Name or code, see `registry.find_scenario`.
+        scenario: Name or code of the scenario, see `registry.find_scenario`.
         folder: Folder of the run; None for ``runs/SCENARIO-SEED``.
-        algo: "ppo"; "sac_her", for scenarios with goals; "bc" or "iql", which learn
-            from recordings.
-        data: Recordings, folders of them and names of datasets, for those; one or
-            several.
-        report: Function of steps done, steps in all and the latest evaluation.
-        **settings: Changes of the preset, see `learn.ppo_config.PPOConfig`,
-            `learn.hindsight.config.HindsightConfig` and
-            `learn.offline.config.OfflineConfig`: `total_steps`, `seed`, `profile`,
-            `observe`, `options`, `drivers` and so on.
+        algo: Name of the algorithm: "ppo"; "sac_her" for scenarios with goals; "bc",
+            "iql", "td3_bc" or "rebrac" for offline RL from recordings.
+        data: Recordings, folders of recordings and names of datasets for offline RL,
+            one or several.
+        report: Function that is called with the finished steps, all steps and the
+            latest evaluation.
+        **settings: Changed settings of the preset: `total_steps`, `seed`, `profile`,
+            `observe`, `options`, `drivers` and others. They are the fields of
+            `learn.ppo_config.PPOConfig`, `learn.hindsight.config.HindsightConfig` and
+            `learn.offline.config.OfflineConfig`.
 
     Raises:
-        ValueError: An unknown scenario or setting, or a folder that holds a run.
-        RuntimeError: A missing extra, with the line that installs it.
+        ValueError: A scenario or a setting is unknown, or the folder contains a run.
+        RuntimeError: An extra is not installed. The message has the command that
+            installs it.
     """
     given = [data] if isinstance(data, str | Path) else data
     config = make_config(algo, scenario, given, settings)
@@ -90,7 +93,7 @@ def train(
 
 
 def default_folder(config: AnyConfig) -> Path:
-    """Return the folder of a run that nobody has named."""
+    """Return the default folder of a run."""
     kind = "" if isinstance(config, PPOConfig) else f"{config.algo}-"
     return Path("runs") / f"{find_scenario(config.scenario).name}-{kind}{config.seed}"
 
@@ -104,17 +107,19 @@ def run_training(
 
     Args:
         config: Configuration of a new run; None to resume the run in the folder.
-        folder: Folder of the run; must be new unless it is resumed.
-        report: Function of steps done, steps in all and the latest evaluation.
+        folder: Folder of the run, which must be empty or missing unless the run is
+            resumed.
+        report: Function that is called with the finished steps, all steps and the
+            latest evaluation.
 
     Returns:
         The last row of ``evaluations.csv``.
 
     Raises:
-        ValueError: a folder that holds another run or other things, no run to resume,
-            or one of another format.
-        RuntimeError: a missing extra, with the line that installs it, or another
-            process that trains in the folder.
+        ValueError: The folder contains another run or other files, there is no run to
+            resume, or the run has another format.
+        RuntimeError: An extra is not installed, and the message has the command that
+            installs it; or another process trains in the folder.
     """
     if config is None:
         config = load_any_config(folder)
@@ -122,10 +127,10 @@ def run_training(
             return _continuation(config, folder, report)()
     if (folder / "config.toml").exists():
         raise ValueError(
-            f"{folder} holds a run already: --resume it, or say another --out"
+            f"{folder} contains a run already: --resume it, or choose another --out"
         )
     if folder.exists() and any(folder.iterdir()):
-        raise ValueError(f"{folder} holds other things: say another folder, --out")
+        raise ValueError(f"{folder} contains other files: choose another --out folder")
     begin = _continuation(config, folder, report)
     folder.mkdir(parents=True, exist_ok=True)
     with _only_here(folder):
@@ -136,7 +141,7 @@ def run_training(
         try:
             return begin()
         except BaseException:
-            # A run that fails to start leaves nothing behind that it has made.
+            # A run that fails to start removes the files that it wrote.
             if not (folder / "state.json").exists():
                 shutil.rmtree(folder)
             raise
@@ -144,10 +149,10 @@ def run_training(
 
 @contextmanager
 def _only_here(folder: Path) -> Iterator[None]:
-    """Let no other process train in a folder.
+    """Lock a folder, so that no other process trains in it.
 
     Raises:
-        RuntimeError: Another one does.
+        RuntimeError: Another process trains in the folder.
     """
     try:
         with FileLock(folder / ".lock", timeout=0):
@@ -159,10 +164,10 @@ def _only_here(folder: Path) -> Iterator[None]:
 def _continuation(
     config: AnyConfig, folder: Path, report: ProgressCallback | None
 ) -> Callable[[], Metrics]:
-    """Return what trains a run from where it stands to its end.
+    """Return a function that trains a run to its end, or resumes it.
 
     Raises:
-        ValueError: an unknown engine or opponent.
+        ValueError: An engine or an opponent is unknown.
     """
     if isinstance(config, OfflineConfig):
         require("torch", "train")
@@ -182,7 +187,7 @@ def _continuation(
     if config.engine not in ENGINES:
         raise ValueError(unknown_name("engine", config.engine, ENGINES))
     engine = ENGINES[config.engine]()
-    if config.self_play:  # Refused now, not at the first evaluation.
+    if config.self_play:  # Unknown drivers raise before the training begins.
         for name in {*config.opponents, *config.eval_opponents}:
             make_driver(name)
     return lambda: _go_on(engine, TrainingRun(config, folder, report))
@@ -195,7 +200,7 @@ def _go_on(
 
 
 Engine = Callable[[TrainingRun[PPOConfig]], Metrics]
-"""Function that trains a run to its end and returns the last evaluation"""
+"""Function that trains a run to its end and returns the last evaluation."""
 
 
 def _sb3() -> Engine:
@@ -226,11 +231,11 @@ ENGINES: dict[str, Callable[[], Engine]] = {
     "sb3": _sb3,
     "rllib": _rllib,
 }
-"""Loaders of the engines, by name; an engine is imported when it is used"""
+"""Loaders of the engines, by name. An engine is imported when it is used."""
 
 
 def versions() -> dict[str, str]:
-    """Return versions of all that a result may depend on; a checkout's git hash."""
+    """Return the versions that a result may depend on; a checkout has a git hash."""
     names = ("marl_airhockey", "numpy", "gymnasium", "pettingzoo", "pymunk", "torch")
     found = {"python": platform.python_version()}
     for name in names:
@@ -239,12 +244,12 @@ def versions() -> dict[str, str]:
         found["stable_baselines3"] = metadata.version("stable_baselines3")
     git = ["git", "-C", str(Path(__file__).parent)]
     try:
-        # An installed copy may lie inside an unrelated repository.
+        # An installed copy may be inside an unrelated repository.
         tracked = [*git, "ls-files", "--error-unmatch", Path(__file__).name]
         subprocess.run(tracked, capture_output=True, check=True)
         head = [*git, "rev-parse", "HEAD"]
         done = subprocess.run(head, capture_output=True, text=True, check=True)
         found["git"] = done.stdout.strip()
     except (OSError, subprocess.CalledProcessError):
-        pass  # The version of the package says it all.
+        pass  # The version of the package is sufficient.
     return found

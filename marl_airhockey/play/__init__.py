@@ -1,1 +1,1 @@
-"""Play in a browser: people, policies and scripts at one table."""
+"""Play in the browser: people, policies and scripts at one table."""

@@ -1,4 +1,4 @@
-"""Access to a server: who may connect, and what browsers may do with its pages."""
+"""Access to a server: checks of requests, and security headers for browsers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 FORWARDED = ("forwarded", "via", "x-forwarded-for", "x-real-ip")
-"""Headers by which a proxy says that a request is not its own"""
+"""Headers that a proxy adds to a request that it forwards."""
 HEADERS = {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; "
@@ -21,24 +21,25 @@ HEADERS = {
     ),
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
-    # The address has the token in it.
+    # The address contains the token.
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
-    # One request of a connection: nothing limits the time until a second one.
+    # One request per connection, because the time until a second one is not limited.
     "Connection": "close",
 }
-"""Headers of all answers"""
+"""Headers of all responses."""
 
 
 class AccessCheck:
-    """Check of requests: our own pages alone, other machines only with the token.
+    """Check of requests: only pages of this server, other machines only with a token.
 
     Args:
-        host: Address that the server listens at.
-        guarded: Whether pages of this machine need the token, too: a real arm moves.
+        host: Address at which the server listens.
+        guarded: True if pages on this machine need the token, too, because a real arm
+            moves.
     """
 
     def __init__(self, host: str, guarded: bool = False) -> None:
@@ -47,10 +48,10 @@ class AccessCheck:
         self.token = secrets.token_urlsafe(12) if needed else ""
 
     def is_remote(self, request: HTTPConnection) -> bool:
-        """Return True unless a page of this machine itself sends a request.
+        """Return False only for a request of a page on this machine without a proxy.
 
-        Behind a proxy all come from the proxy's address. One that passes the original
-        ``Host``, or any of `FORWARDED`, is known by that.
+        All requests behind a proxy come from the address of the proxy. A proxy is
+        recognized by the original ``Host`` or by a header in `FORWARDED`.
         """
         peer = request.client.host if request.client else ""
         name = urlsplit(f"//{request.headers.get('host', '')}").hostname
@@ -58,22 +59,22 @@ class AccessCheck:
         return forwarded or peer not in LOOPBACK or name not in LOOPBACK
 
     def refusal(self, request: HTTPConnection) -> Response | None:
-        """Return the answer to a request that is refused; None to accept it."""
+        """Return the response that rejects a request; None to accept the request."""
         host = request.headers.get("host", "")
         origin = request.headers.get("origin")
         try:
             name = urlsplit(f"//{host}").hostname or ""
             site = host if origin is None else urlsplit(origin).netloc
         except ValueError:
-            return _refuse("Host or Origin is no address", 400)
-        # Without a token, a foreign page must not reach us under a name of its own.
+            return _refuse("Host or Origin is not a valid address", 400)
+        # Without a token, a page of another site must not connect by another host name.
         if self.local and name not in LOOPBACK:
             return _refuse("open the address that airhockey play printed")
         if site != host:
-            return _refuse("another site's page may not connect")
+            return _refuse("pages of other sites cannot connect")
         given = request.query_params.get("token", "").encode()
         if self.token and not secrets.compare_digest(given, self.token.encode()):
-            return _refuse("the link lacks its token: open the whole address")
+            return _refuse("the token is missing in the link: open the whole address")
         return None
 
 
@@ -82,10 +83,10 @@ def _refuse(reason: str, status: int = 403) -> Response:
 
 
 class SecurityHeaders:
-    """Application whose answers have `HEADERS`, too.
+    """Application that adds `HEADERS` to the responses of another application.
 
     Args:
-        app: Application.
+        app: Other application.
     """
 
     def __init__(self, app: ASGIApp) -> None:

@@ -1,4 +1,4 @@
-"""Cells of tables: numbers with intervals, and texts that mean nothing else."""
+"""Cells of tables: numbers with intervals, and escaped texts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""Beginnings by which spreadsheets take a text for a formula"""
+"""Prefixes of a text that spreadsheets read as a formula."""
 
 
 def number(value: float, digits: int) -> str:
@@ -19,7 +19,7 @@ def number(value: float, digits: int) -> str:
 
 
 def shown(values: Sequence[float], digits: int) -> str:
-    """Return a value with its interval, if it has one, as text; "-" for nan."""
+    """Return a value as text, with its interval if there is one; "-" for nan."""
     middle, low, high = values
     if np.isnan(middle) or np.isnan(low):
         return number(middle, digits)

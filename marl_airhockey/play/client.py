@@ -1,4 +1,4 @@
-"""One connected page, as a session knows it."""
+"""Connected page of a session."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ class Client:
 
     def __init__(self) -> None:
         self.name = secrets.token_hex(4)
-        """Pseudonym: the same for all games of a page, known to nobody."""
+        """Pseudonym of the page, which is the same in all of its games."""
         self.key = ""
-        """Secret by which a page is recognised when it is loaded again."""
+        """Secret that identifies a page after it is loaded again."""
         self.consent: str | None = None
-        """Version of the texts that the person has agreed to, in a study."""
+        """Version of the texts to which the person agreed in a study."""
         self.seat: int | None = None
         self.watches = False
-        """True for a page that may watch and nothing else."""
+        """True for a page that may only watch."""
         self.acknowledged = 0
-        """Number of the last aim that a control step has used."""
+        """Number of the last aim that was used in a control step."""
         self.round_trip: float | None = None
         """Time from an aim to the frame that shows it, ms, as measured by the page."""
         self.last_input = time.monotonic()
         """Time of the last movement, s."""
         self.last_held = float("-inf")
-        """Time of the last aim by a pointer that is held, s."""
+        """Time of the last aim with a pointer that is held down, s."""
         self.pointer = (float("nan"), float("nan"))
         """Last aim, table frame, m."""
         self.device: dict[str, Any] = {}
         """Fields of the message ``device``, see `protocol.MESSAGES`."""
         self.limiter = RateLimiter(self.last_input)
         self.frame = ""
-        """Newest message to be sent; it replaces one that was not sent in time."""
+        """Newest message to send; it replaces a message that was not sent in time."""
         self.frame_number = 0
-        """Number of that frame."""
+        """Number of the newest message."""
         self.frame_ready = asyncio.Event()
         self.link = Link(self.last_input)

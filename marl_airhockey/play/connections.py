@@ -1,4 +1,4 @@
-"""Connections of a server before a request is known: how many, and for how long."""
+"""Limits on the connections of a server before their request is complete."""
 
 from __future__ import annotations
 
@@ -17,24 +17,26 @@ from marl_airhockey.play.access import SecurityHeaders
 from marl_airhockey.play.protocol import LARGEST
 
 WAITING, WAITING_OF_ONE = 128, 32
-"""Most connections without a request, in all and of an address; older ones are cut"""
+"""Largest number of connections without a request, in total and per address. New
+connections replace the oldest ones."""
 HEADER_TIME = 5.0
-"""Longest time until a request is complete, s"""
+"""Longest time until a request is complete, s."""
 BACKLOG = 64
-"""Most connections that are accepted at a time"""
+"""Largest number of connections that wait to be accepted."""
 LINES, PERIOD = 3, 10.0
-"""Most lines of a log in a period, and the period, s"""
+"""Largest number of lines of a log in a period, and the period, s."""
 
 
 class LimitedProtocol(H11Protocol):
-    """Protocol of a connection: one request, which must be complete soon.
+    """Protocol of a connection with one request and a time limit.
 
-    A connection without a complete request is dropped after `HEADER_TIME`, or when too
-    many newer ones wait; whoever sends a request at once is never dropped.
+    A connection without a complete request is dropped after `HEADER_TIME`, or when
+    there are too many newer ones. A connection with a complete request is never
+    dropped.
     """
 
     waiting: ClassVar[list[LimitedProtocol]] = []
-    """Connections without a request, the oldest first."""
+    """Connections without a request, sorted by age with the oldest first."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
@@ -67,14 +69,14 @@ class LimitedProtocol(H11Protocol):
 
 
 class RareLines(logging.Filter):
-    """Filter that passes `LINES` lines in a `PERIOD`, without tracebacks."""
+    """Filter that passes `LINES` lines per `PERIOD`, without tracebacks."""
 
     def __init__(self) -> None:
         super().__init__()
         self._times: list[float] = []
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Return True for a record that is written; cut it to one line."""
+        """Return True for a record that is written; reduce it to one line."""
         now = time.monotonic()
         self._times = [t for t in self._times if now - t < PERIOD]
         if len(self._times) == LINES:
@@ -91,16 +93,16 @@ def listen(host: str, port: int) -> socket.socket:
     """Return a listening TCP socket.
 
     Raises:
-        ValueError: An address that is taken or not ours.
+        ValueError: The address is in use, or does not belong to this machine.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # With the protocol named, asyncio sets TCP_NODELAY: Nagle's algorithm would delay
-    # each frame until the page has acknowledged the last one.
+    # With an explicit protocol, asyncio sets TCP_NODELAY. Otherwise Nagle's algorithm
+    # would delay each frame until the page has acknowledged the last one.
     server = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         server.bind((host, port))
-        # Connections that come before the server runs wait for it.
+        # Connections that arrive before the server runs wait for it.
         server.listen(BACKLOG)
     except OSError as error:
         server.close()
@@ -111,7 +113,7 @@ def listen(host: str, port: int) -> socket.socket:
 def serve(app: ASGIApp, server: socket.socket) -> None:
     """Serve an application at a listening socket until interrupted.
 
-    Its answers have the security headers of `access.HEADERS`.
+    All responses have the security headers of `access.HEADERS`.
     """
     settings: dict[str, Any] = {
         "log_level": "error",

@@ -1,4 +1,4 @@
-"""Games: what recordings say of the players; a file that makes no sense is skipped."""
+"""Games and their players in recordings; damaged files are skipped."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ FOREIGN = (
     *(ValueError, TypeError, KeyError, IndexError, AttributeError),
     *(ArithmeticError, OSError, RecursionError, MemoryError),
 )
-"""Errors of files that others have made or changed"""
+"""Errors that damaged or foreign files can raise."""
 
 
 @dataclass(frozen=True)
 class Game:
-    """Game of a recording: its players, by seat, and who has won against whom."""
+    """Game of a recording, with its players, by seat, and the results of pairs."""
 
     path: Path
     players: list[Player]
     pairs: list[tuple[str, str, float]]
-    """Rows (player, other player, score of the first: 1, 0.5 or 0)."""
+    """Rows (player, other player, score of the player: 1, 0.5 or 0)."""
     episodes: int
     broken_off: int
 
     @property
     def people(self) -> tuple[str, ...]:
-        """Names of the people in it."""
+        """Names of the people in the game."""
         return tuple(sorted(player.name for player in self.players if player.person))
 
 
 def read_games(
     folder: Path, scenario: str | None = None
 ) -> tuple[list[Game], list[str]]:
-    """Read all recordings under a folder, or those of one scenario.
+    """Read all recordings in a folder, or those of one scenario.
 
-    Practice games of a study are left out.
+    Practice games of a study are ignored.
 
     Returns:
-        The games, and a line for each file that was skipped.
+        The games, and a line with the reason for each file that was skipped.
 
     Raises:
-        ValueError: No recording, or several scenarios.
+        ValueError: There are no recordings, or several scenarios.
     """
     if not folder.is_dir():
-        raise ValueError(f"{folder}: there is no such folder")
+        raise ValueError(f"{folder}: this folder does not exist")
     heads: dict[Path, dict[str, Any]] = {}
     skipped: list[str] = []
     for path in (meta.parent for meta in sorted(folder.rglob(META))):
@@ -65,7 +65,9 @@ def read_games(
             skipped.append(_why(path, error))
     names = sorted({head["scenario"] for head in heads.values()})
     if scenario is None and len(names) > 1:
-        raise ValueError(f"{folder} has {', '.join(names)}: choose one by --scenario")
+        raise ValueError(
+            f"{folder} contains {', '.join(names)}; choose one with --scenario"
+        )
     found = []
     for path, head in heads.items():
         if scenario in (None, head["scenario"]):
@@ -76,39 +78,40 @@ def read_games(
     if not found:
         what = f" of {scenario}" if scenario else ""
         rest = f"; skipped: {'; '.join(skipped)}" if skipped else ""
-        raise ValueError(f"{folder}: there are no recordings{what} in it{rest}")
+        raise ValueError(f"{folder}: it contains no recordings{what}{rest}")
     return found, skipped
 
 
 def _why(path: Path, error: BaseException) -> str:
-    """Return a line that names a file and what is wrong with it."""
+    """Return a line with the path of a file and its error."""
     words = " ".join(str(error).split()) or type(error).__name__
     if not isinstance(error, ValueError):
-        words = f"no recording of a game: {type(error).__name__}: {words}"
+        words = f"not a recording of a game: {type(error).__name__}: {words}"
     return words if str(path) in words else f"{path}: {words}"
 
 
 def _table(head: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """Return a table of a head; an empty one if there is none."""
+    """Return a table of the metadata; an empty one if it does not exist."""
     found = head.get(name) or {}
     if not isinstance(found, Mapping):
-        raise ValueError(f"{name}: {found!r} is no table")
+        raise ValueError(f"{name}: {found!r}; expected a table")
     return found
 
 
 def _game(path: Path) -> Game:
-    """Read a recording.
+    """Read the game of a recording.
 
     Raises:
-        ValueError: It is none of a game, or makes no sense. Others of `FOREIGN`, too.
+        ValueError: It is not a recording of a game, or is damaged. Other errors of
+            `FOREIGN` are possible.
     """
     recording = read_recording(path)
     scene = scenario_of(recording).scene
     if not recording.episodes:
-        raise ValueError("there are no steps in it")
+        raise ValueError("it contains no steps")
     players = [*_players(recording.head)]
     if len(players) != len(scene.seats):
-        raise ValueError(f"{len(players)} players at {len(scene.seats)} seats")
+        raise ValueError(f"{len(players)} players for {len(scene.seats)} seats")
     pairs: list[tuple[str, str, float]] = []
     for episode in recording.episodes:
         if episode.reason == PLAYED and len(episode):
@@ -122,15 +125,16 @@ def _game(path: Path) -> Game:
 
 
 def _players(head: Mapping[str, Any]) -> Iterable[Player]:
-    """Yield the players of a head.
+    """Yield the players in the metadata of a recording.
 
-    A driver is named as the plan of a study names it; elsewhere with its handicap.
+    In a study a driver has the label of the plan. Otherwise its name includes the
+    handicap.
     """
     label = _table(head, "study").get("opponent")
     handicap = Handicap(**_table(head, "handicap")).caption
     rows = head.get("players")
     if not isinstance(rows, Sequence) or not all(isinstance(r, Mapping) for r in rows):
-        raise ValueError("it does not name its players")
+        raise ValueError("its meta.json has no list of players")
     for row in rows:
         person, driver = row.get("person"), str(row.get("driver"))
         shown = f"{driver} ({handicap})" if handicap else driver
@@ -140,7 +144,7 @@ def _players(head: Mapping[str, Any]) -> Iterable[Player]:
 def _result(
     players: Sequence[Player], scene: Scene, episode: Episode
 ) -> list[tuple[str, str, float]]:
-    """Count a game that was played to the end, for each player and each pair."""
+    """Add the points of a completed game to its players; return those of pairs."""
     teams = [seat.team for seat in scene.seats]
     if len(set(teams)) == 1:
         return []

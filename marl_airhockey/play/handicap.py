@@ -1,4 +1,4 @@
-"""Handicaps: drivers that are limited to human latency, precision and speed."""
+"""Handicaps, which limit drivers to human latency, precision and speed."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ class Handicap:
     """Limits of a driver; the defaults are no limits.
 
     Raises:
-        ValueError: a value outside `BOUNDS`; names the field.
+        ValueError: A value is outside `BOUNDS`.
     """
 
     reaction: float = 0.0
-    """Delay of each action, s; rounded to a multiple of the driver's control_dt."""
+    """Latency of each action, s; rounded to a multiple of the driver's control_dt."""
     noise: float = 0.0
     """Standard deviation of normal noise on each component of the action, as a
-    fraction of top speed."""
+    fraction of the top speed."""
     pace: float = 1.0
-    """Largest norm of the action, as a fraction of top speed."""
+    """Largest norm of the action, as a fraction of the top speed."""
 
     def __post_init__(self) -> None:
         for name, (low, high) in BOUNDS.items():
@@ -43,7 +43,7 @@ class Handicap:
                 )
 
     def apply(self, driver: Driver) -> Driver:
-        """Return a driver that acts as `driver` does, within these limits."""
+        """Return `driver` with these limits."""
         return HandicappedDriver(driver, self)
 
     @property
@@ -56,21 +56,21 @@ class Handicap:
 
 PRESETS = {
     "full strength": Handicap(),
-    # Beside the reaction of the games, of 0.15 s.
+    # In addition, the games have an observation latency of 0.15 s.
     "human speed": Handicap(reaction=0.05, noise=0.05, pace=0.7),
     "gentle": Handicap(reaction=0.1, noise=0.1, pace=0.4),
 }
-"""Handicaps that a page offers, the one without limits first."""
+"""Handicaps that a page offers, starting with the one without limits."""
 USUAL = "human speed"
-"""Handicap of drivers that play against people who have not chosen another one."""
+"""Default handicap of drivers that play against people."""
 
 
 @dataclass
 class HandicappedDriver(Driver):
-    """Driver that passes on another one's actions within a handicap.
+    """Driver that applies a handicap to the actions of another driver.
 
-    It decides as often as the other one; without a control_dt of its own as often as in
-    its training, every 0.05 s if nothing says.
+    It has the control_dt of the other driver. If the other driver has none, it has the
+    control_dt of its training, or else 0.05 s.
     """
 
     inner: Driver

@@ -1,4 +1,4 @@
-"""Host of a session: what pages may do at a match, and what they get to know."""
+"""Host of a session, which defines what pages may do and what they receive."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from marl_airhockey.play.client import Client
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.seats import Seats
 
-GONE = "a player has gone"
-"""Reason of a match that is paused as a page has gone"""
+GONE = "a player has disconnected"
+"""Reason for the pause of a match after a page disconnected."""
 GRACE = 10.0
-"""Time for which the seat of a page that has gone, say to reload, is reserved, s."""
+"""Time for which the seat of a page that disconnected is reserved, s."""
 Handler = Callable[..., None]
-"""Function of a page and the fields of its message"""
+"""Function of a page and the fields of its message."""
 
 
 class Host(ABC):
@@ -40,38 +40,38 @@ class Host(ABC):
 
     @abstractmethod
     def describe(self) -> dict[str, Any]:
-        """Return what a page gets once: the match, and what can be chosen; JSON."""
+        """Return the JSON that a page receives once: the match and all choices."""
 
     def status(self) -> dict[str, Any]:
-        """Return what all pages get at every tick in addition; JSON."""
+        """Return the additional JSON that all pages receive at every tick."""
         return {}
 
     def own_fields(self, client: Client) -> dict[str, Any]:
-        """Return what one page alone gets at every tick in addition; JSON."""
+        """Return the additional JSON that one page receives at every tick."""
         return {}
 
     def clear_table(self, reason: str) -> None:
-        """End the match and its recording, so that others find a fresh lobby."""
+        """End the match and its recording, and return to the lobby."""
         if self.recorder is not None:
             self.recorder.end(self.match, reason)
         self.match.clear()
 
     def before_message(self) -> None:
-        """Do what is due before a message is handled."""
+        """Update the host before a message is handled."""
         return None
 
     def disconnected(self, client: Client) -> None:
-        """Free the seat of a page that has gone."""
+        """Free the seat of a page that disconnected."""
         if client.seat is not None:
             self.seats.leave(client, GONE)
 
     def after_tick(self) -> None:
-        """Do what follows a tick of the match."""
+        """Update the host after a tick of the match."""
         return None
 
     @abstractmethod
     def check_presence(self, now: float) -> None:
-        """Handle pages that are idle or gone; called once a second.
+        """Handle pages that are idle or disconnected; called once per second.
 
         Args:
             now: Monotonic time, s.

@@ -1,4 +1,4 @@
-"""Link to a page: how many frames a second it takes, by its acknowledgements."""
+"""Link to a page, whose frame rate depends on the acknowledgements of the page."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from collections import deque
 from marl_airhockey.play.live_match import RATE
 
 STRIDES = (1, 2, 6)
-"""Ticks between two frames, by level: 60, 30 or 10 frames a second"""
+"""Number of ticks between two frames, by level: 60, 30 or 10 frames/s."""
 QUEUED = 0.1
-"""Delay beyond the shortest one from which frames wait on their way, s"""
+"""Delay in excess of the shortest delay that indicates a queue of frames, s."""
 BATCH = 0.05
-"""Time for which a page may collect acknowledgements, s"""
+"""Time for which a page may collect acknowledgements, s."""
 FORGOTTEN = 1.0
-"""Age from which a frame counts as answered: a page may acknowledge nothing, s"""
+"""Time after which a frame without an acknowledgement no longer counts as sent, s."""
 WINDOW = 30.0
-"""Time over which the shortest delay is taken, s"""
+"""Time window for the shortest delay, s."""
 FIRST_TRY, NEXT_TRY, LAST_TRY = 0.25, 2.0, 60.0
-"""Times without a late frame until more are tried: at first, after a failure, and at
-most, s"""
+"""Times without a delayed frame until a higher rate is tried, s: at the start, after a
+failure, and the largest time."""
 STEADY = 30.0
-"""Time without a late frame after which failures are forgotten, s"""
+"""Time without a delayed frame after which failures are forgotten, s."""
 
 
 class Link:
-    """Pace of the frames to a page; only the newest frame is ever sent.
+    """Rate control of the frames to a page; only the newest frame is sent.
 
-    It begins with the fewest frames and tries more while answers come without delay.
-    A page that acknowledges nothing gets a few frames a second.
+    The rate starts at the lowest level. It increases while acknowledgements arrive
+    without delay. A page that acknowledges nothing receives a few frames per second.
 
     Args:
         now: Monotonic time, s.
@@ -40,16 +40,16 @@ class Link:
         self._flying: deque[tuple[int, float]] = deque()
         """Number and time of the frames that are not acknowledged."""
         self._delays: deque[tuple[float, float]] = deque()
-        """Time and delay of acknowledgements after which no shorter delay came."""
+        """Time and delay of acknowledgements without a later shorter delay."""
         self._arrivals: deque[float] = deque()
-        """Times at which frames were acknowledged, of the last second."""
+        """Times of acknowledgements in the last second."""
         self._was_late = False
         self.delay = 0.0
         """Time from the last acknowledged frame to its acknowledgement, s."""
 
     @property
     def rate(self) -> int:
-        """Frames a second."""
+        """Frame rate, frames/s."""
         return RATE // STRIDES[self._level]
 
     @property
@@ -57,13 +57,14 @@ class Link:
         return self._delays[0][1] if self._delays else 0.0
 
     def is_due(self, number: int, now: float) -> bool:
-        """Return whether a frame may be sent.
+        """Return True if a frame may be sent.
 
-        No more are on their way than twice those that the link has taken in a round
-        trip, so that no queue forms before its delay is seen.
+        The number of frames without an acknowledgement is limited to twice the number
+        that the link transmits in one round trip. This limits the queue before its
+        delay is measured.
 
         Args:
-            number: Number of the frame, one a tick.
+            number: Number of the frame, which counts ticks.
             now: Monotonic time, s.
         """
         while self._flying and now - self._flying[0][1] > FORGOTTEN + self._shortest:
@@ -75,12 +76,12 @@ class Link:
         return due and len(self._flying) < 2.0 * taken + 2.0
 
     def note_sent(self, number: int, now: float) -> None:
-        """Note that a frame is on its way."""
+        """Store that a frame was sent."""
         self._last = number
         self._flying.append((number, now))
 
     def acknowledge(self, number: int, now: float) -> None:
-        """Take the word of a page that a frame, and all before it, have come."""
+        """Process the acknowledgement of a frame and all previous ones."""
         sent = None
         while self._flying and self._flying[0][0] <= number:
             sent = self._flying.popleft()
@@ -94,7 +95,7 @@ class Link:
         while now - self._delays[0][0] > WINDOW:
             self._delays.popleft()
         late = self.delay > self._shortest + QUEUED
-        # A page may pause for a moment: one late answer alone changes nothing.
+        # A page may pause briefly, so a single delayed answer has no effect.
         if late and self._was_late and self._level < len(STRIDES) - 1:
             self._level += 1
             self._patience = min(max(2 * self._patience, NEXT_TRY), LAST_TRY)

@@ -1,4 +1,4 @@
-"""Live match: its drivers, its phases, its clock. No network here."""
+"""Live match: drivers, phases and clock, without the network."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.sim.world.world import World
 
 RATE = 60
-"""Ticks, and control steps, per second."""
+"""Number of ticks and of control steps per second."""
 COUNTDOWN = 3.0
 """Time from the start of a match to its first step, s."""
 RESUME = 1.5
@@ -29,21 +29,22 @@ Phase = Literal["lobby", "arrange", "countdown", "play", "pause", "done"]
 
 
 class LiveMatch:
-    """One world of which every seat is driven, in the phases of a match.
+    """World with a driver for every seat, in the phases of a match.
 
     Args:
-        scenario: its name.
-        drivers: by agent: `PERSON`, or a driver's name or path; people elsewhere.
-        keywords: of the environment, without drivers.
-        handicap: Of all drivers that are no people; None for no limits.
-        seed: of the first episode.
+        scenario: Name of the scenario.
+        drivers: `PERSON`, or name or path of a driver, by agent; a person for all other
+            agents.
+        keywords: Keywords of the environment, without drivers.
+        handicap: Limits of all drivers that are not people; None for no limits.
+        seed: Seed of the first episode.
 
     Raises:
-        ValueError: an unknown scenario, agent or driver.
+        ValueError: The scenario, an agent or a driver does not exist.
     """
 
     CONTROL_DT = 1 / RATE
-    """s, unless the keywords say otherwise"""
+    """Default time between two actions, s."""
 
     def __init__(
         self,
@@ -61,17 +62,17 @@ class LiveMatch:
         for agent in drivers:
             if agent not in agents:
                 raise ValueError(
-                    f"seat {agent!r} is unknown; {scenario} has {', '.join(agents)}"
+                    f"unknown agent {agent!r}; {scenario} has {', '.join(agents)}"
                 )
         profile = self.keywords.get("profile", "ideal")
         self.drivers = MatchDrivers(self.world, profile, handicap or Handicap())
         self.phase: Phase = "lobby"
         self.number = 0
-        """Count of episodes."""
+        """Number of episodes."""
         self.ticks = 0
-        """Control steps of this episode."""
+        """Number of control steps of this episode."""
         self.pauses = 0
-        """Pauses of this episode."""
+        """Number of pauses of this episode."""
         self.time_left = 0.0
         """Rest of a countdown, s."""
         self.reason = ""
@@ -109,17 +110,18 @@ class LiveMatch:
 
     @property
     def winners(self) -> list[int]:
-        """Seats that meet the scenario's criterion of success."""
+        """Indices of the seats that are successful."""
         return np.flatnonzero(self.world.episode.success[0]).tolist()
 
     def set_driver(self, i: int, name: str) -> None:
-        """Give a seat to another driver, between matches.
+        """Set the driver of a seat, between matches.
 
         Raises:
-            ValueError: during a match, an unknown name, or a policy that does not fit.
+            ValueError: A match is running, the name is unknown, or the policy does not
+                fit.
         """
         if self.phase not in ("lobby", "done"):
-            raise ValueError("seats change between matches")
+            raise ValueError("drivers can only change between matches")
         self.drivers.set(i, name)
         if self.phase == "done":
             self.clear()
@@ -127,19 +129,16 @@ class LiveMatch:
             self.drivers.reset([i])
 
     def substitute(self, i: int) -> None:
-        """Let a driver take over a seat, in a match too: a fitting policy or a script.
+        """Set a fitting policy or script as the driver of a seat, even in a match.
 
         Raises:
-            ValueError: It does not fit.
+            ValueError: The driver does not fit.
         """
         self.drivers.set(i, next(iter(self.drivers.fitting_policies), "allround"))
         self.drivers.reset([i])
 
     def clear(self) -> None:
-        """End the match that runs, and forget the last one: a fresh lobby.
-
-        The rules are the usual ones again, after a golden goal too.
-        """
+        """End a running match, and return to the lobby with the normal rules."""
         self.abort("cleared")
         if self.phase == "done":
             self._use(self._rules)
@@ -147,13 +146,13 @@ class LiveMatch:
             self.phase, self.reason = "lobby", ""
 
     def set_handicap(self, handicap: Handicap) -> None:
-        """Limit all drivers that are no people, from the next match on.
+        """Limit all drivers that are not people, from the next match on.
 
         Raises:
-            ValueError: during a match.
+            ValueError: A match is running.
         """
         if self.phase not in ("lobby", "done"):
-            raise ValueError("opponents change between matches")
+            raise ValueError("opponents can only change between matches")
         self.drivers.handicap = handicap
         for i, name in enumerate(self.drivers.names):
             if name != PERSON:
@@ -165,7 +164,7 @@ class LiveMatch:
         return float(rotated[0]), float(rotated[1])
 
     def warm_up(self) -> None:
-        """Play half a second and reset, so that all loops are compiled by then."""
+        """Play half a second and reset, so that all loops are compiled."""
         for _ in range(RATE // 2):
             self._step()
         self.world.seed(int(self.world.seeds[0]))
@@ -173,7 +172,7 @@ class LiveMatch:
         self._next_episode()
 
     def start(self) -> None:
-        """Begin a match, or resume a paused one, with a countdown."""
+        """Start a match, or resume a paused one, with a countdown."""
         if self.phase == "pause":
             self.phase, self.time_left = "countdown", max(self.time_left, RESUME)
         elif self.phase in ("lobby", "done"):
@@ -185,13 +184,13 @@ class LiveMatch:
 
     @property
     def offers_golden_goal(self) -> bool:
-        """True after a game that ended with as many goals for either team."""
+        """True after a game that ended with the same number of goals for both teams."""
         over = self.phase == "done" and not self.reason
         names = [field.name for field in fields(self.world.scenario)]
         return over and "goals_to_win" in names and self._decided_by != "goals"
 
     def start_golden_goal(self) -> None:
-        """Begin a match that the next goal decides, with a countdown."""
+        """Start a match that the next goal decides, with a countdown."""
         if self.offers_golden_goal:
             options = {**self._rules.get("options", {}), "goals_to_win": 1}
             self._use({**self._rules, "options": options})
@@ -199,7 +198,7 @@ class LiveMatch:
             self.phase, self.time_left = "countdown", COUNTDOWN
 
     def _use(self, keywords: Keywords) -> None:
-        """Play by the rules of keywords from the next episode on."""
+        """Use the rules of some keywords from the next episode on."""
         if keywords != self.keywords:
             self.world.close()
             self.keywords = keywords
@@ -209,7 +208,8 @@ class LiveMatch:
             self._next_episode()
 
     def _build(self) -> World:
-        # Policies of any form can take a seat at any time; none of the zoo sees pixels.
+        # Policies with any observation type can take a seat at any time, except pixels,
+        # which no policy of the zoo uses.
         forms = [form for form in OBSERVE if form != "pixels"]
         return build_world(self._scenario, 1, False, self.keywords, forms)
 
@@ -220,12 +220,12 @@ class LiveMatch:
             self.pauses += 1
 
     def abort(self, reason: str) -> None:
-        """End a match before its time; it has no winner."""
+        """End a match early, without a winner."""
         if self.phase in ("play", "countdown", "pause"):
             self.phase, self.reason = "done", reason
 
     def tick(self) -> bool:
-        """Advance the clock by 1 / `RATE` s; return True if the world made a step."""
+        """Advance the clock by 1 / `RATE` s; return True if the world was stepped."""
         self.events = []
         if self.phase == "countdown":
             self.time_left -= 1 / RATE
@@ -237,14 +237,15 @@ class LiveMatch:
         return True
 
     def close(self) -> None:
-        """Leave the drivers and close the physics."""
+        """Close the drivers and the world."""
         self.drivers.close()
         self.world.close()
 
     def state(self) -> dict[str, Any]:
-        """Return what a page draws: `messages.drawn`, with phase and clock.
+        """Return the data that a page draws: `messages.drawn`, with phase and clock.
 
-        ``n`` counts the steps of the episode; ``time_left`` is that of a countdown, s.
+        ``n`` counts the steps of the episode. ``time_left`` is the rest of a countdown,
+        s.
         """
         return {
             "phase": self.phase,
@@ -268,12 +269,12 @@ class LiveMatch:
         )
 
     def describe(self) -> dict[str, Any]:
-        """Return what never changes in a match: `messages.description`."""
+        """Return the constant data of a match: `messages.description`."""
         world = self.world
         return description(world.scenario, world.max_cycles * world.control_dt)
 
     def _next_episode(self) -> None:
-        """Let the world begin an episode."""
+        """Start the next episode of the world."""
         self.world.reset()
         self._begin_episode()
 
@@ -285,7 +286,7 @@ class LiveMatch:
         self.first = first_columns(self.world)
 
     def _step(self) -> None:
-        """Make one control step of the world and note its events."""
+        """Step the world once and store its events."""
         world = self.world
         actions = np.zeros((1, len(self.seats), 2))
         for i in range(len(self.seats)):

@@ -1,4 +1,4 @@
-"""Drivers of a match: people by their input devices, policies, scripts."""
+"""Drivers of a match: people with input devices, policies and scripts."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from marl_airhockey.toolkit.pointing import ARM_LAG
 from marl_airhockey.types import Array
 
 PERSON = "person"
-"""Name of the driver of a seat that people take."""
+"""Name of the driver of a seat for people."""
 
 
 class MatchDrivers:
-    """One driver for each seat of a world; people everywhere at first.
+    """Drivers of all seats of a world; initially a person in each seat.
 
     Args:
-        world: of one row.
-        profile: of the world, by which fitting policies are sorted.
-        handicap: Of all drivers that are no people.
+        world: Batch with a single world.
+        profile: Profile of the world, by which fitting policies are sorted.
+        handicap: Limits of all drivers that are not people.
     """
 
     def __init__(self, world: World, profile: str, handicap: Handicap) -> None:
@@ -51,7 +51,7 @@ class MatchDrivers:
 
     @property
     def choices(self) -> list[str]:
-        """Names of drivers to choose from: fitting policies, then scripts."""
+        """Names of drivers that players can choose: fitting policies, then scripts."""
         known = {name: make_driver(name) for name in independent_driver_names()}
         goal = isinstance(self._world.scenario, GoalScenario)
         real = self._world.live is not None
@@ -70,7 +70,7 @@ class MatchDrivers:
 
     @property
     def digests(self) -> list[str]:
-        """First 16 hexadecimal digits of the SHA-256 of each seat's policy; "" else."""
+        """First 16 hexadecimal digits of the SHA-256 of each seat's policy, or ""."""
         files = [policy_file(name.partition(":")[0]) for name in self.names]
         return [
             hashlib.sha256(file.read_bytes()).hexdigest()[:16] if file.is_file() else ""
@@ -79,15 +79,15 @@ class MatchDrivers:
 
     @cached_property
     def fitting_policies(self) -> list[str]:
-        """Policies of the zoo for this game: same rules, table, seats, observations.
+        """Policies of the zoo with the same rules, table, seats and observations.
 
-        Those that were trained in the same profile come first.
+        Policies that were trained in the same profile come first.
         """
         scenario, observer = self._world.scenario, self._world.observer
         found: list[tuple[bool, str]] = []
         for name in zoo_names():
             card = NumpyPolicy.load(ZOO / f"{name[4:]}.npz").card
-            # First what costs nothing: a layout is compiled with the next episode.
+            # Compare the scenario first, because a layout has to be compiled.
             if card["scenario"] != scenario.name:
                 continue
             own = make_scenario(card["scenario"], **card["options"])
@@ -99,17 +99,17 @@ class MatchDrivers:
         return [name for _, name in sorted(found)]
 
     def enter(self, world: World) -> None:
-        """Play in another world of the same game."""
+        """Move the drivers to another world of the same game."""
         self._world = world
         for seat in self._driven:
             seat.driver.__exit__(None, None, None)
         self._driven = [self._build(i) for i in range(len(self.names))]
 
     def set(self, i: int, name: str) -> None:
-        """Give a seat to another driver; if it does not fit, the old one stays.
+        """Set the driver of a seat; the old driver remains if the new one does not fit.
 
         Raises:
-            ValueError: an unknown name, or a policy that does not fit.
+            ValueError: The name is unknown, or the policy does not fit.
         """
         old_name, old = self.names[i], self._driven[i]
         self.names[i] = name
@@ -123,7 +123,7 @@ class MatchDrivers:
         old.driver.__exit__(None, None, None)
 
     def input_device(self, i: int, kind: str) -> Driver:
-        """Return the driver by which a person steers a seat: "mouse" or "gamepad"."""
+        """Return the driver of a person's input device: "mouse" or "gamepad"."""
         if self.names[i] == PERSON and self._device_kinds[i] != kind:
             self._device_kinds[i] = kind
             self._devices[i] = make_driver(self._by_kind[kind])
@@ -132,28 +132,29 @@ class MatchDrivers:
         return self._devices[i]
 
     def kind_of_device(self, i: int) -> str:
-        """Return by what a person steers a seat: "mouse" or "gamepad"."""
+        """Return the input device of a seat: "mouse" or "gamepad"."""
         return self._device_kinds[i]
 
     def reset(self, seats: Iterable[int]) -> None:
-        """Begin an episode for the drivers of some seats."""
+        """Start an episode for the drivers of some seats."""
         one, world = np.zeros(1, np.int64), self._world
         for i in seats:
             self._driven[i].reset(one, world.seeds, world.episode.number)
 
     def action(self, i: int) -> Array:
-        """Return the action of a seat, (1, 2) fractions of top speed, ego frame.
+        """Return the action of a seat (1, 2), fractions of the top speed, ego frame.
 
-        Of one that is position-driven and commands no device it is 0.
+        The action is 0 for a position-driven seat that commands no device.
         """
         if not self._driven[i].acts:
             return np.zeros((1, 2))
         return self._driven[i].act(self._world.known)
 
     def prescribed(self) -> Array | None:
-        """Return (1, seats, 4) where led paddles are, nan for those that ask.
+        """Return measured position and velocity of paddles (1, seats, 4), ego frame.
 
-        None if all ask.
+        Values are nan for seats that are not position-driven. Returns None if no seat
+        is position-driven.
         """
         places = [seat.measured() for seat in self._driven]
         if all(place is None for place in places):
@@ -163,22 +164,24 @@ class MatchDrivers:
 
     @property
     def troubles(self) -> list[str]:
-        """Reason why a led paddle rests, by seat; "" for none."""
+        """Reason why a paddle that follows a person is at rest, by seat, or ""."""
         return [seat.driver.trouble for seat in self._driven]
 
     def close(self) -> None:
-        """Leave all drivers."""
+        """Close all drivers."""
         for seat in self._driven:
             seat.driver.__exit__(None, None, None)
 
     def _build(self, i: int) -> DrivenSeat:
-        """Return a seat's driver, with the handicap unless it is a person."""
+        """Return the driver of a seat, with the handicap unless it is a person."""
         name, world = self.names[i], self._world
         driver = self._devices[i]
         if name != PERSON:
             driver = make_driver(name)
             if driver.needs_person and not driver.needs_device:
-                raise ValueError(f"{name} is a person's input device: say {PERSON}")
+                raise ValueError(
+                    f"{name} is the input device of a person; use {PERSON}"
+                )
             live = world.live is not None
             refuse_erratic(f"paddle_{i}", driver, live)
             if not (driver.needs_person or driver.needs_device):

@@ -1,4 +1,4 @@
-"""Measurements of a player, from the steps of recordings."""
+"""Measurements of players from the steps of recordings."""
 
 from __future__ import annotations
 
@@ -13,37 +13,38 @@ from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.types import Array
 
 INCOMING = 0.1
-"""Speed toward one's own end from which a puck counts as incoming, m/s."""
+"""Least speed toward the player's own end of an incoming puck, m/s."""
 
 
 @dataclass
 class Player:
-    """Measurements of one player, of some episodes."""
+    """Measurements of one player in some episodes."""
 
     name: str
     person: bool
     points: list[float] = field(default_factory=list)
-    """Of each game that was played to the end: 1 if won, 0.5 if drawn, 0 if lost."""
+    """Points of each completed game: 1 for a win, 0.5 for a draw, 0 for a loss."""
     interceptions: list[bool] = field(default_factory=list)
     """One value for each incoming puck: True if it was hit."""
     shot_speeds: list[float] = field(default_factory=list)
     """Speeds of pucks that left the paddle toward the other end, m/s."""
     shot_placements: list[float] = field(default_factory=list)
-    """Offsets from the middle at which those pucks would reach the other end, banks
-    included, m."""
+    """Offsets from the centre at which those pucks would reach the other end, with wall
+    bounces, m."""
     steps: int = 0
     limited: int = 0
-    """Steps whose action exceeded the limits of speed, acceleration or reach."""
+    """Number of steps whose action exceeded a limit of speed, acceleration or
+    workspace."""
     delays: list[float] = field(default_factory=list)
     """Round trips of the page, ms."""
 
     @property
     def games(self) -> int:
-        """Number of games that were played to the end."""
+        """Number of completed games."""
         return len(self.points)
 
     def __add__(self, other: Player) -> Player:
-        """Return both players' measurements as those of one."""
+        """Return the combined measurements of both players."""
         names = [f.name for f in fields(self) if f.name not in ("name", "person")]
         both = {name: getattr(self, name) + getattr(other, name) for name in names}
         return Player(self.name, self.person, **both)
@@ -53,10 +54,10 @@ def measure(player: Player, i: int, scene: Scene, episode: Episode) -> None:
     """Add the measurements of an episode to a player.
 
     Args:
-        player: is changed.
-        i: index of the player's seat.
-        scene: in which it was.
-        episode: as it was recorded.
+        player: Player, changed in place.
+        i: Index of the player's seat.
+        scene: Scene of the episode.
+        episode: Recorded episode.
     """
     columns, bodies, table = episode.columns, scene.bodies, scene.table
     bound = [VIOLATIONS.index(name) for name in ("speed", "acceleration", "reach")]
@@ -85,12 +86,12 @@ def measure(player: Player, i: int, scene: Scene, episode: Episode) -> None:
 
 
 def interceptions(position: Array, velocity: Array, hits: Array) -> Iterator[bool]:
-    """Yield, each time that a puck came into one's own half, whether it was hit.
+    """Yield, for each puck that enters the player's own half, True if it was hit.
 
     Args:
-        position: of the puck, (T, 2) m, ego frame.
-        velocity: of the puck, (T, 2) m/s, ego frame.
-        hits: (T,) steps in which one's paddle hit it.
+        position: Positions of the puck (T, 2), ego frame, m.
+        velocity: Velocities of the puck (T, 2), ego frame, m/s.
+        hits: Steps in which the player's paddle hit the puck (T,), bool.
     """
     incoming = False
     for n in range(len(position)):
@@ -101,5 +102,5 @@ def interceptions(position: Array, velocity: Array, hits: Array) -> Iterator[boo
             incoming = False
             yield True
         elif incoming and velocity[n, 0] > INCOMING:
-            incoming = False  # It came back from the wall, or was served anew.
+            incoming = False  # It bounced off the wall, or was re-served.
             yield False

@@ -1,6 +1,6 @@
-"""Contents of the messages that a page gets about a world.
+"""Contents of the messages that a page receives about a world.
 
-All values are JSON; lengths are in metres, positions in the table frame, numbers
+All values are JSON. Lengths are in metres and positions in the table frame. Numbers are
 rounded to four decimals.
 """
 
@@ -21,17 +21,17 @@ from marl_airhockey.types import Array, Memory
 def drawn(
     scenario: Scenario, state: State, memory: Memory, returns: Array, success: Array
 ) -> dict[str, Any]:
-    """Return all that a page draws of a world.
+    """Return the data of a world that a page draws.
 
-    ``pucks`` are rows x, y, vx, vy; ``marks`` are rows kind, ax, ay, bx, by, radius,
+    ``pucks`` are rows x, y, vx, vy. ``marks`` are rows kind, ax, ay, bx, by, radius,
     meaning (see `Mark`).
 
     Args:
-        scenario: what is played.
-        state: without leading axes.
-        memory: of the scenario, without leading axes.
-        returns: (seats,)
-        success: (seats,) bool
+        scenario: Scenario of the world.
+        state: State, without leading axes.
+        memory: Memory of the scenario, without leading axes.
+        returns: Returns of the seats so far (seats,).
+        success: Success of the seats (seats,), bool.
     """
     eliminated = scenario.eliminated(memory)
     return {
@@ -57,7 +57,7 @@ def events(state: State) -> list[list[Any]]:
     """Return rows ["goal", goal line, puck] and ["hit", paddle, puck] of a step.
 
     Args:
-        state: after it, without leading axes.
+        state: State after the step, without leading axes.
     """
     goals = [["goal", line, k] for k, line in np.argwhere(state.crossed).tolist()]
     hits = [["hit", i, k] for i, k in np.argwhere(state.touched > 0).tolist()]
@@ -65,11 +65,11 @@ def events(state: State) -> list[list[Any]]:
 
 
 def description(scenario: Scenario, seconds: float) -> dict[str, Any]:
-    """Return what never changes: the table, its seats, the limits of time and speed.
+    """Return the constant data: the table, its seats, and limits of time and speed.
 
     Args:
-        scenario: what is played.
-        seconds: length of an episode.
+        scenario: Scenario of the world.
+        seconds: Length of an episode, s.
     """
     scene, table = scenario.scene, scenario.scene.table
     return {
@@ -102,7 +102,7 @@ def description(scenario: Scenario, seconds: float) -> dict[str, Any]:
 
 
 def _goal_lines(scene: Scene) -> list[dict[str, Any]]:
-    """Return the goals that have a width; ``owner`` is a seat, -1 for nobody's."""
+    """Return the goals that have a width; ``owner`` is a seat, or -1 for no seat."""
     sides = [seat.side for seat in scene.seats]
     return [
         {

@@ -1,4 +1,4 @@
-"""Open table: a match at which everybody with the page can take a seat."""
+"""Open table: a match in which every page can take a free seat."""
 
 from __future__ import annotations
 
@@ -22,42 +22,42 @@ from marl_airhockey.play.session import Session
 
 @dataclass(frozen=True)
 class Plant:
-    """Plant behind a table, in which faults can be switched on."""
+    """Emulated devices of a table, whose faults can be switched on and off."""
 
     faults: Mapping[str, str] = field(default_factory=dict)
-    """Descriptions of the faults, by name"""
+    """Descriptions of the faults, by name."""
     switch: Callable[[str, bool], None] = lambda name, on: None
-    """Function that switches one on or off"""
+    """Function that switches a fault on or off."""
 
 
 def open_table(
     match: LiveMatch, recorder: Recorder | None = None, plant: Plant | None = None
 ) -> Session:
-    """Return a session in which everybody can take a free seat.
+    """Return a session in which every page can take a free seat.
 
     Args:
-        match: Match.
-        recorder: Recorder of the episodes; None for none.
-        plant: Plant whose faults pages may switch, of a virtual lab.
+        match: Match of the session.
+        recorder: Recorder of the episodes; None to record nothing.
+        plant: Devices of a virtual lab, whose faults pages may switch.
     """
     return Session(OpenTable(Seats(match), recorder, plant or Plant()))
 
 
 class OpenTable(Host):
-    """Host that gives a free seat to every page.
+    """Host that assigns a free seat to every page.
 
     Args:
         seats: Seats of the match.
-        recorder: Recorder of the episodes; None for none.
-        plant: Plant whose faults pages may switch.
+        recorder: Recorder of the episodes; None to record nothing.
+        plant: Devices whose faults pages may switch.
     """
 
     def __init__(self, seats: Seats, recorder: Recorder | None, plant: Plant) -> None:
         super().__init__(seats)
         self._recorder, self.plant = recorder, plant
         self._left: dict[int, tuple[str, float]] = {}
-        """Key of the page that had a free seat last, and the time until which the seat
-        is reserved for it, by seat."""
+        """Key of the last page of a free seat, and the time until which the seat is
+        reserved for it, s, by seat."""
         self._handlers: dict[str, Handler] = {
             "hello": self._hello,
             "aim": seats.aim,
@@ -93,12 +93,12 @@ class OpenTable(Host):
         }
 
     def disconnected(self, client: Client) -> None:
-        """Free the seat of a page that has gone, and reserve it for `GRACE`."""
+        """Free the seat of a page that disconnected, and reserve it for `GRACE`."""
         if client.seat is not None:
             self._free(client, GONE, time.monotonic() + GRACE)
 
     def check_presence(self, now: float) -> None:
-        """Free the seats of idle pages; clear a table that everybody has left."""
+        """Free the seats of idle pages; clear a table that all people have left."""
         for client in self.seats.clients:
             if self.seats.is_idle(client, now):
                 self._free(client, "a player has been idle", now)
@@ -110,13 +110,13 @@ class OpenTable(Host):
                 self.clear_table("everybody has left")
 
     def _free(self, client: Client, reason: str, until: float) -> None:
-        """Free the seat of a page, which may come back to it."""
+        """Free the seat of a page, which can return to it until a time, s."""
         assert client.seat is not None
         self._left[client.seat] = client.key, until
         self.seats.leave(client, reason)
 
     def _take(self, client: Client, seat: int) -> None:
-        """Give a page a seat; somebody new finds no match of others there."""
+        """Assign a seat to a page; a new person does not continue a running match."""
         last, _ = self._left.pop(seat, ("", 0.0))
         if last != client.key and self.match.phase != "lobby":
             self.clear_table("the players changed")
@@ -143,10 +143,10 @@ class OpenTable(Host):
 
     def _stop(self, client: Client) -> None:
         if self.seats.may_control(client):
-            self.match.abort("broken off by a player")
+            self.match.abort("ended by a player")
 
     def _substitute(self, client: Client) -> None:
-        """Let drivers take over the seats that people have left, and go on."""
+        """Set drivers for the seats that people have left, and continue the match."""
         if client.seat is None or self.match.phase != "pause":
             return
         for seat in self.seats.free:
@@ -163,7 +163,7 @@ class OpenTable(Host):
         return self.match.phase in ("lobby", "done")
 
     def _swap(self, client: Client) -> None:
-        """Move everybody to the next seat: in a duel, the ends change."""
+        """Move all players to the next seat; in a duel they change ends."""
         if not self.seats.may_control(client) or not self._between_matches:
             return
         names = list(self.match.drivers.names)
@@ -191,7 +191,7 @@ class OpenTable(Host):
         if seat >= len(drivers.names) or seat in taken:
             return
         if name in [*drivers.choices, PERSON] and self._between_matches:
-            # What is offered fits; the match refuses the rest.
+            # Offered drivers fit; the match rejects other drivers.
             with contextlib.suppress(ValueError):
                 self.match.set_driver(seat, name)
 

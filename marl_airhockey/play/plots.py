@@ -14,22 +14,22 @@ from marl_airhockey.play.report import Report
 from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
 
 LINE = 0.34
-"""Height of a player's line, inches"""
+"""Height of the line of a player, inches."""
 NAME = 26
-"""Largest number of characters in a line of a player's name"""
+"""Largest number of characters in a line of a player's name."""
 PANELS = (
     ("delays", "round trip of the page, ms"),
     ("shot_speeds", "speed of shots, m/s"),
     ("shot_placements", "offset at which shots\nwould arrive, m"),
 )
-"""Fields of `Player` that are drawn, and what they are"""
+"""Fields of `Player` in the plot, and their labels."""
 
 
 def plot_report(report: Report, path: Path) -> None:
     """Write a PNG with a line for each player.
 
-    It shows the score with its 95 % interval, and medians and quartiles of round trips,
-    speeds and placements of shots.
+    The plot shows the score with its 95 % interval, and medians and quartiles of round
+    trips and of speed and placement of shots.
     """
     rows = report.rows()[::-1]
     players = [report.players[row["player"]] for row in rows]
@@ -64,7 +64,7 @@ def plot_report(report: Report, path: Path) -> None:
 def _line(
     axes: Axes, k: int, player: Player, middle: float, low: float, high: float
 ) -> None:
-    """Draw a value and its range in the line of a player."""
+    """Plot a value and its range in the line of a player."""
     ink = INK if player.person else INKS[0]
     axes.plot([low, high], [k, k], color=ink, linewidth=2)
     axes.plot(middle, k, "o", color=ink)

@@ -1,4 +1,4 @@
-"""Messages from a page to the server: JSON objects, checked field by field."""
+"""Messages from a page to the server: JSON objects whose fields are checked."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import math
 from typing import Any
 
 LARGEST = 1024
-"""Most characters of a message."""
+"""Largest number of characters in a message."""
 RATE_LIMIT = 240.0
-"""Messages per second that a page may send on average."""
+"""Largest average number of messages per second of a page."""
 BURST = 480.0
-"""Messages that a page may send at once."""
+"""Largest number of messages in a burst."""
 LONGEST = 800
-"""Most characters of a text."""
+"""Largest number of characters in a text."""
 
 
 class Text(str):
-    """Text of at most `LONGEST` characters, which may be empty."""
+    """Text with at most `LONGEST` characters, which may be empty."""
 
     __slots__ = ()
 
@@ -53,13 +53,14 @@ MESSAGES: dict[str, dict[str, type]] = {
 }
 """Kinds of messages (key ``t``) and the types of their fields.
 
-``x`` and ``y`` are a position in the table frame, m, for ``aim``, and a share of full
-tilt along the axes of the table frame for ``stick``. ``held`` is 1 while a button or a
-finger is down: a real arm moves only then. ``q`` counts the aims of a page;
-``rtt`` is the time, ms, that it measured between an aim and the frame that shows it.
-``device`` tells what a person steers by, the size of the window and the pixels of the
-screen a pixel of it, and the pictures a second. ``seen`` acknowledges a frame by its
-number, and all before it. The last five kinds belong to studies.
+In ``aim``, ``x`` and ``y`` are a position, table frame, m. In ``stick`` they are
+fractions of full tilt along the axes of the table frame. ``held`` is 1 while a button
+or a finger is down; a real arm only moves then. ``q`` counts the aims of a page.
+``rtt`` is the time from an aim to the frame that shows it, as measured by the page, ms.
+``device`` contains the input device, the size of the window, the number of screen
+pixels per pixel of the window, and the frame rate of the page, frames/s. ``seen``
+acknowledges a frame and all previous ones by its number. The last five kinds belong to
+studies.
 """
 
 
@@ -67,14 +68,14 @@ def parse(text: str) -> tuple[str, dict[str, Any]]:
     """Return the kind of a message and its fields.
 
     Raises:
-        ValueError: text that is none of `MESSAGES`; says what is wrong.
+        ValueError: The text is not one of `MESSAGES`.
     """
     if len(text) > LARGEST:
-        raise ValueError(f"a message has at most {LARGEST} characters")
+        raise ValueError(f"a message can have at most {LARGEST} characters")
     try:
         data = json.loads(text, parse_constant=_refuse)
     except RecursionError as error:
-        raise ValueError("not JSON: too deep") from error
+        raise ValueError("not JSON: it is nested too deeply") from error
     except json.JSONDecodeError as error:
         raise ValueError("not JSON") from error
     if not isinstance(data, dict) or data.get("t") not in list(MESSAGES):
@@ -87,12 +88,12 @@ def parse(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def _refuse(name: str) -> None:
-    """Raise ValueError for NaN and Infinity, which JSON does not have."""
-    raise ValueError(f"{name} is no number")
+    """Raise ValueError for NaN and Infinity, which are not part of JSON."""
+    raise ValueError(f"{name} is not a number")
 
 
 def _check(name: str, value: Any, kind: type) -> Any:
-    """Return a field's value as its type; raise ValueError if it has another."""
+    """Return the value of a field as its type; raise ValueError for another type."""
     if kind is Text:
         if not isinstance(value, str) or len(value) > LONGEST:
             raise ValueError(f"{name}: must be at most {LONGEST} characters")
@@ -105,7 +106,7 @@ def _check(name: str, value: Any, kind: type) -> Any:
     if not number or abs(value) > 1e9 or not math.isfinite(value):
         raise ValueError(f"{name}: must be a number")
     if kind is int and (value != int(value) or value < 0):
-        raise ValueError(f"{name}: must be a whole number, not negative")
+        raise ValueError(f"{name}: must be a whole number of at least 0")
     return kind(value)
 
 
@@ -113,20 +114,20 @@ class RateLimiter:
     """Token bucket that refills at `RATE_LIMIT` up to `BURST`.
 
     Args:
-        now: time, s.
+        now: Current time, s.
     """
 
     def __init__(self, now: float) -> None:
         self._level, self._last = BURST, now
 
     def acquire(self, now: float) -> None:
-        """Count a message at a time, s.
+        """Count a message that arrives at a time, s.
 
         Raises:
-            ValueError: too many messages.
+            ValueError: The page has sent too many messages.
         """
         refilled = self._level + (now - self._last) * RATE_LIMIT
         self._level = min(BURST, refilled) - 1.0
         self._last = now
         if self._level < 0.0:
-            raise ValueError(f"more than {RATE_LIMIT:.0f} messages a second")
+            raise ValueError(f"more than {RATE_LIMIT:.0f} messages per second")

@@ -1,4 +1,4 @@
-"""Real match: one on a real table, whose steps take as long as they last."""
+"""Match on a real table, in real time."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
 
 WIDTH, QUALITY = 640, 80
-"""Width of the camera's pictures as pages get them, px, and their JPEG quality"""
+"""Width of the camera images that pages receive, px, and their JPEG quality."""
 LIVE = 0.25
-"""Longest time for which a page's video waits for the next picture, s"""
+"""Longest time for which the video of a page waits for the next frame, s."""
 DRAWN = 60
-"""Number of newest pictures whose median time until they are drawn is shown"""
+"""Number of newest frames whose median display latency is shown."""
 PICTURE = 0.08
-"""Shortest time between two of them, s"""
+"""Shortest time between two images with the estimate, s."""
 REST = 1.5
-"""Time between two episodes that begin by themselves, s"""
+"""Time between two episodes that start automatically, s."""
 
 
 class CountingOperator:
-    """Operator who counts down, for all to see, before a puck is let go.
+    """Operator with a countdown on the page before the release of a puck.
 
     Args:
-        own: who does the work.
-        match: whose phase shows the time that is left.
+        own: Operator that places and releases the puck.
+        match: Match whose phase shows the countdown.
     """
 
     def __init__(self, own: Operator, match: RealMatch) -> None:
@@ -43,7 +43,7 @@ class CountingOperator:
         self._release = own.release
 
     def release(self) -> None:
-        """Count down, then let the puck go."""
+        """Count down, then release the puck."""
         self._match.count_down()
         self._release()
 
@@ -51,20 +51,20 @@ class CountingOperator:
 class RealMatch(LiveMatch):
     """Match on a real table.
 
-    `tick` runs in a thread of its own: it waits for the world's steps, for the arm to
-    come home and for the people who put the puck on the table. A table cannot be
-    paused: who asks for it ends the episode, and the paddle brakes.
+    `tick` runs in a separate thread. It waits for the steps of the world, for the arm
+    to move to its start position, and for the people who place the puck. A real table
+    cannot be paused: `pause` ends the episode, and the paddle brakes.
 
     Args:
-        scenario: its name.
-        drivers: see `LiveMatch`.
-        keywords: of the environment, the rig among them.
-        handicap: see `LiveMatch`, without noise.
-        seed: of the first episode.
+        scenario: Name of the scenario.
+        drivers: Drivers by agent, see `LiveMatch`.
+        keywords: Keywords of the environment, with the rig.
+        handicap: Limits without noise, see `LiveMatch`.
+        seed: Seed of the first episode.
     """
 
     CONTROL_DT = 0.05
-    """Period of the policies for real arms, s"""
+    """Default time between two actions, s: that of the policies for real arms."""
 
     def __init__(
         self,
@@ -79,12 +79,12 @@ class RealMatch(LiveMatch):
         self._picture, self._pictured = b"", 0.0
         self._ended = 0.0
         self.again = False
-        """True to begin episodes without being asked, the first for who looks on."""
+        """True to start episodes automatically while a page is connected."""
         self.watched = False
         """True while pages are connected."""
         self.drawn_after: deque[float] = deque(maxlen=DRAWN)
-        """Times from the middle of an exposure until a page says that it has drawn the
-        picture, s, of the newest pictures."""
+        """Display latencies of the newest frames, s: from the middle of the exposure
+        until a page reports that the frame is displayed."""
         super().__init__(scenario, drivers, keywords, handicap, seed)
         own = make_operator(self.backend.rig.operator, self.ask)
         self.backend.placing.operator = CountingOperator(own, self)
@@ -97,27 +97,30 @@ class RealMatch(LiveMatch):
         return backend
 
     def _next_episode(self) -> None:
-        """Draw what an episode begins with; nothing moves before `start`."""
+        """Sample the start of an episode; nothing moves before `start`."""
         self.world.draw_worlds(np.zeros(1, np.int64))
         self._begin_episode()
 
     def set_handicap(self, handicap: Handicap) -> None:
         if handicap.noise:
-            raise ValueError("noise: a real arm is given none")
+            raise ValueError("noise: noise is not allowed on a real arm; give 0")
         super().set_handicap(handicap)
 
     def warm_up(self) -> None:
-        """Do nothing: what is compiled is so before an episode begins."""
+        """Do nothing: everything is compiled before an episode starts."""
 
     def start(self) -> None:
-        """Begin an episode, or answer what a person was asked."""
+        """Start an episode, or confirm a question to a person."""
         if self.phase == "pause":
             self._answered.set()
         elif self.phase in ("lobby", "done"):
-            self.phase, self.reason = "arrange", "the paddle goes to its place"
+            self.phase, self.reason = (
+                "arrange",
+                "the paddle moves to its start position",
+            )
 
     def pause(self, reason: str = "") -> None:
-        """End the episode: a puck on a real table does not wait."""
+        """End the episode, because a puck on a real table cannot be paused."""
         self.abort(reason or "stopped")
 
     def abort(self, reason: str) -> None:
@@ -125,11 +128,11 @@ class RealMatch(LiveMatch):
         if self.phase in ("play", "countdown", "pause", "arrange"):
             self.backend.robot.disable()
             self.phase, self.reason = "done", reason
-            # Nobody presses a button after a stop but to begin again.
+            # After a stop, an episode starts only by a button.
             self.again = False
 
     def clear(self) -> None:
-        """Forget the last episode; of one that runs, do no more than end it.
+        """Return to the lobby after an episode; a running episode is only ended.
 
         Another thread may still wait for the arm or for people.
         """
@@ -139,10 +142,10 @@ class RealMatch(LiveMatch):
             self.abort("the players changed")
 
     def ask(self, words: str) -> None:
-        """Show words to the people at the pages; return when one of them agrees.
+        """Show a text on the pages; return when a person confirms it.
 
         Raises:
-            RuntimeError: they broke it off.
+            RuntimeError: A person ended the episode, or the match was closed.
         """
         self._answered.clear()
         self.phase, self.reason = "pause", words
@@ -151,10 +154,10 @@ class RealMatch(LiveMatch):
         self.phase, self.reason = "arrange", ""
 
     def count_down(self) -> None:
-        """Let `COUNTDOWN` pass.
+        """Show the countdown and wait until it ends.
 
         Raises:
-            RuntimeError: it was broken off.
+            RuntimeError: A person ended the episode, or the match was closed.
         """
         until = time.monotonic() + COUNTDOWN
         self.phase, self.reason = "countdown", ""
@@ -166,7 +169,9 @@ class RealMatch(LiveMatch):
 
     def _go_on(self) -> None:
         if self._closing.is_set() or self.phase == "done":
-            raise RuntimeError(self.reason if self.phase == "done" else "it was closed")
+            raise RuntimeError(
+                self.reason if self.phase == "done" else "the match was closed"
+            )
 
     def tick(self) -> bool:
         with self._busy:
@@ -204,7 +209,7 @@ class RealMatch(LiveMatch):
             self.reason = self.result.interruption
 
     def state(self) -> dict[str, Any]:
-        # Pages note pictures in another thread.
+        # Pages report drawn frames in another thread.
         times = list(self.drawn_after)
         drawn = round(1e3 * float(np.median(times)), 1) if times else None
         table = {**self.backend.telemetry(), "drawn_ms": drawn}
@@ -216,12 +221,12 @@ class RealMatch(LiveMatch):
         return {**super().describe(), "video": video}
 
     def live_picture(self, after: int) -> tuple[int, float, bytes] | None:
-        """Return the next picture from above: its number, time taken, s, and a JPEG.
+        """Return the next frame from above: its number, exposure time, s, and a JPEG.
 
-        None if none comes in time.
+        Returns None if no frame arrives in time.
 
         Args:
-            after: number of the last one.
+            after: Number of the last frame.
         """
         frame = self.backend.camera.next(after, LIVE)
         if frame is None:
@@ -232,14 +237,14 @@ class RealMatch(LiveMatch):
         return (frame.number, frame.taken, packed.tobytes()) if done else None
 
     def note_drawn(self, taken: float) -> None:
-        """Note that a page has drawn the picture that was taken at a time, s."""
+        """Store that a page has drawn the frame that was exposed at a time, s."""
         self.drawn_after.append(time.monotonic() - taken)
 
     def picture(self) -> bytes:
-        """Return the camera's newest picture, a JPEG with the estimate drawn over it.
+        """Return a JPEG of the newest camera frame with the estimated state.
 
         Raises:
-            RuntimeError: there is none.
+            RuntimeError: There is no frame.
         """
         now = time.monotonic()
         if now - self._pictured > PICTURE:

@@ -1,7 +1,7 @@
-"""Recorder of matches: what it has written survives a kill of the process.
+"""Recorder of matches; written steps survive the end of the process.
 
-An episode is a recording, see `core.recording`, whose head names the players. The
-frames of a camera are in it, too. A disk that is full ends a recording, not the match.
+Each episode is a recording, see `core.recording`, with the players in its metadata. It
+can contain the video of a camera. A full disk ends a recording, but not the match.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from marl_airhockey.sim.core.recording import FILM, Columns
 
 
 class Recorder:
-    """Writer of the episodes of a match, a recording each.
+    """Writer of a recording for each episode of a match.
 
     Args:
-        folder: Folder, which is made if it does not exist.
-        camera: Camera whose pictures are kept, too; None for none.
-        keep: Most recordings that are kept; then the oldest of this recorder go. None
-            for all.
+        folder: Folder of the recordings, which is created if it does not exist.
+        camera: Camera whose video is recorded, too; None for no video.
+        keep: Largest number of recordings of this recorder; the oldest are deleted.
+            None for no limit.
 
     Raises:
-        ValueError: A folder that cannot be made.
+        ValueError: The folder cannot be created.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class Recorder:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ValueError(f"--record {folder}: {error.strerror}") from error
-        # Here, and not in the first step of a match.
+        # Load slow libraries now, not in the first step of a match.
         require("pyarrow", EXTRA)
         warm_up()
         if camera is not None:
@@ -58,12 +58,12 @@ class Recorder:
         self._film: Film | None = None
         self._keep, self._kept = keep, deque[Path]()
         self.notes: dict[str, Any] = {}
-        """Value of the key "study" of the head."""
+        """Value of the key "study" of the metadata."""
         self._writer: RecordingWriter | None = None
         self.path: Path | None = None
         """Path of the last recording."""
         self.failure = ""
-        """Reason why the last episode is not recorded to its end; "" if it is."""
+        """Reason why the last episode is not recorded completely; "" if it is."""
 
     @property
     def runs(self) -> bool:
@@ -76,12 +76,12 @@ class Recorder:
         players: list[dict[str, Any]],
         devices: list[dict[str, Any] | None],
     ) -> None:
-        """Begin a recording.
+        """Start a recording.
 
         Args:
-            match: Match whose first step of an episode has been made.
-            players: Driver, person's pseudonym and consent, by seat.
-            devices: Input device, screen and pictures a second of each page, by seat.
+            match: Match after the first step of an episode.
+            players: Driver, and pseudonym and consent of the person, by seat.
+            devices: Input device, window and frame rate of each page, by seat.
         """
         self.end(match, "cut off")
         self.failure = ""
@@ -102,11 +102,11 @@ class Recorder:
             self._writer.begin(_only(match.first), *episode_notes(match.world))
 
     def step(self, match: LiveMatch, **pages: Any) -> None:
-        """Add the last step.
+        """Add the last step of a match.
 
         Args:
-            match: Match that made it.
-            pages: Columns of what pages do, arrays by seat, see `Seats.columns`.
+            match: Match after the step.
+            pages: Columns with the input of pages, arrays by seat, see `Seats.columns`.
         """
         if self._writer is None or match.result is None:
             return
@@ -118,7 +118,7 @@ class Recorder:
             self._writer.add(row)
 
     def end(self, match: LiveMatch, reason: str) -> None:
-        """Write how the episode ended and close the recording, if one is open."""
+        """Write the reason for the end and close the recording, if one is open."""
         if self._writer is None:
             return
         with self._giving_up():
@@ -130,7 +130,7 @@ class Recorder:
 
     @contextlib.contextmanager
     def _giving_up(self) -> Iterator[None]:
-        """End the recording, but not the match, on an error of the disk."""
+        """End the recording, but not the match, after an error of the disk."""
         try:
             yield
         except OSError as error:
@@ -148,10 +148,10 @@ class Recorder:
 
     @property
     def trouble(self) -> str:
-        """What is missing in the video that is being written; "" if nothing is."""
+        """Error of the video that is being written; "" for none."""
         return self._film.trouble if self._film is not None else ""
 
 
 def _only(columns: Columns) -> Columns:
-    """Return the columns of the only world."""
+    """Return the columns of a batch with a single world, without the batch axis."""
     return {name: value[0] for name, value in columns.items()}

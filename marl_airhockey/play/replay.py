@@ -1,4 +1,4 @@
-"""Replay: what a page is sent to show a recorded episode."""
+"""Data with which a page shows a recorded episode."""
 
 from __future__ import annotations
 
@@ -16,30 +16,32 @@ from marl_airhockey.sim.core.recording import Episode, Recording
 
 
 def one_episode(path: Path, number: int = 0) -> Recording:
-    """Read a recording and return it with one of its episodes, which has steps.
+    """Read a recording and return it with one of its episodes only.
 
     Raises:
-        ValueError: no recording, or no such episode in it.
+        ValueError: The path is not a recording, or the episode does not exist or has no
+            steps.
     """
     recording = read_recording(path)
     if not 0 <= number < len(recording.episodes):
         raise ValueError(
-            f"{path}: there is no episode {number}, but {len(recording.episodes)}"
+            f"{path}: there is no episode {number}; it has {len(recording.episodes)}"
         )
     episode = recording.episodes[number]
     if not len(episode):
-        raise ValueError(f"{path}: there are no steps in it")
+        raise ValueError(f"{path}: the episode has no steps")
     return replace(recording, episodes=[episode])
 
 
 def replay_of(path: Path, number: int = 0) -> dict[str, Any]:
-    """Return all that a page needs to show an episode of a recording.
+    """Return the data that a page needs to show an episode of a recording.
 
-    ``meta`` describes the table and who plays, ``steps`` are frames as a live match
-    has them, the one before the first step included, ``end`` says how it ended.
+    ``meta`` describes the table and the players. ``steps`` are frames like those of a
+    live match, with one before the first step. ``end`` has the reason for the end.
 
     Raises:
-        ValueError: no recording, no such episode, or one of another version.
+        ValueError: The path is not a recording, the episode does not exist, or it has
+            another format.
     """
     recording = one_episode(path, number)
     (episode,), head = recording.episodes, recording.head
@@ -61,14 +63,14 @@ def replay_of(path: Path, number: int = 0) -> dict[str, Any]:
 
 
 def _players(head: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the rows of players; none if they make no sense."""
+    """Return the rows of players; an empty list if they are invalid."""
     rows = head.get("players")
     listed = isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
     return rows if isinstance(rows, list) and listed else []
 
 
 def frames_of(episode: Episode, scenario: Scenario) -> list[dict[str, Any]]:
-    """Return the frames (T + 1) of an episode, as `LiveMatch.state` has them."""
+    """Return the T + 1 frames of an episode in the form of `LiveMatch.state`."""
     states, memories = states_of(episode, scenario), memories_of(episode)
     seats = len(scenario.scene.seats)
     none = np.zeros((1, seats))

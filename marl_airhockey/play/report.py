@@ -1,4 +1,4 @@
-"""Report of recordings, by player: results, shots, limits."""
+"""Report of recordings by player, with results, shots and limits."""
 
 from __future__ import annotations
 
@@ -26,19 +26,20 @@ from marl_airhockey.play.measures import Player
 from marl_airhockey.types import Array
 
 MOST_GROUPS = 60
-"""Most groups of games that an interval without people is made of"""
+"""Largest number of groups of games for an interval."""
 NAN = float("nan")
 HEADER = (
     *("player", "games", "people", "score (95 %)", "Elo (95 %)", "pucks hit (95 %)"),
     *("shots", "shot, m/s (95 %)", "spread of shots, m", "at limits", "round trip, ms"),
 )
 LEGEND = (
-    "Score: win + draw / 2, of games played to the end. Shots: pucks that left the "
-    "paddle toward the other end; their interquartile mean speed, and the deviation of "
-    "where they would reach that end. At limits: share of the steps whose action "
-    "exceeded speed, acceleration or reach. Intervals of a driver are over the people "
-    "that it met, as the games of a person are not independent; those of a person, and "
-    f"of drivers among themselves, over games; none of fewer than {FEWEST_GROUPS}."
+    "Score: win + draw / 2, of completed games. Shots: pucks that left the paddle "
+    "toward the other end, with their interquartile mean speed and the standard "
+    "deviation of the position at which they would reach that end. At limits: share of "
+    "the steps whose action exceeded a limit of speed, acceleration or workspace. "
+    "Intervals of a driver are over the people that it met, because the games of a "
+    "person are not independent. Intervals of a person, and of drivers without people, "
+    f"are over games. There is no interval for fewer than {FEWEST_GROUPS}."
 )
 
 
@@ -48,7 +49,7 @@ class Report:
 
     games: list[Game]
     skipped: list[str] = field(default_factory=list)
-    """A line for each file that was skipped."""
+    """Lines with the reason for each file that was skipped."""
 
     @property
     def episodes(self) -> int:
@@ -57,12 +58,12 @@ class Report:
 
     @property
     def broken_off(self) -> int:
-        """Number of episodes that were not played to the end."""
+        """Number of episodes that were not completed."""
         return sum(game.broken_off for game in self.games)
 
     @cached_property
     def _groups(self) -> dict[str, list[Player]]:
-        """Measurements by player, in groups that are independent of each other."""
+        """Measurements by player, in independent groups."""
         found: dict[str, dict[object, Player]] = {}
         for game in self.games:
             for player in game.players:
@@ -73,13 +74,13 @@ class Report:
 
     @cached_property
     def players(self) -> dict[str, Player]:
-        """Measurements by the player's name."""
+        """Measurements of each player, by name."""
         return {name: reduce(add, groups) for name, groups in self._groups.items()}
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a row for each player, those with most games first.
+        """Return a row for each player, sorted by the number of games.
 
-        Values with an interval are lists (value, low, high); nan where there is none.
+        Values with an interval are lists (value, low, high), with nan for no interval.
         """
         ratings = self._ratings()
         ranked = sorted(self.players.values(), key=lambda p: (-p.games, p.name))
@@ -109,7 +110,7 @@ class Report:
         }
 
     def _ratings(self) -> dict[str, list[float]]:
-        """Return the Elo of each player with its 95 % interval."""
+        """Return the Elo rating of each player with its 95 % interval."""
         units: dict[object, list[tuple[str, str, float]]] = {}
         for game in self.games:
             if game.pairs:
@@ -122,7 +123,7 @@ class Report:
             return {}
 
         def rate(chosen: list[int]) -> Array:
-            """Return the Elo of each name from some groups of games."""
+            """Return the Elo rating of each name from some groups of games."""
             score, played = np.zeros((2, len(names), len(names)))
             for a, b, points in (pair for k in chosen for pair in groups[k]):
                 i, j = names.index(a), names.index(b)
@@ -159,7 +160,7 @@ class Report:
             )
             for row in self.rows()
         ]
-        title = f"# {self.episodes} recorded episodes, {self.broken_off} broken off"
+        title = f"# {self.episodes} recorded episodes, {self.broken_off} not completed"
         skipped = [f"* skipped: {line}" for line in self.skipped]
         lines = [title, "", *markdown(HEADER, rows), "", LEGEND, *skipped]
         return "\n".join(lines) + "\n"
@@ -176,7 +177,7 @@ class Report:
 
 
 def summarize(folder: Path, scenario: str | None = None) -> Report:
-    """Return the report of all recordings under a folder, or of one scenario's.
+    """Return the report of all recordings in a folder, or of those of one scenario.
 
     Raises:
         ValueError: See `games.read_games`.
@@ -185,7 +186,7 @@ def summarize(folder: Path, scenario: str | None = None) -> Report:
 
 
 def _split(groups: list[list[Any]]) -> list[list[Any]]:
-    """Return at most `MOST_GROUPS` groups, of which some are joined."""
+    """Return at most `MOST_GROUPS` groups; further groups are merged into them."""
     count = min(len(groups), MOST_GROUPS)
     return [[x for group in groups[k::count] for x in group] for k in range(count)]
 
@@ -195,9 +196,10 @@ def _merged(players: list[Player]) -> list[Player]:
 
 
 def share(groups: Sequence[Sequence[float]]) -> list[float]:
-    """Return a share with its 95 % interval, of points 0 .. 1 in groups.
+    """Return the mean of points 0 .. 1 in groups with its 95 % interval.
 
-    Of one point a group, or if all are the same, by Wilson (1927); else by a jackknife.
+    The interval is that of Wilson (1927) for one point per group, or if all means are
+    the same. Otherwise it is computed by a jackknife.
     """
     groups = [group for group in groups if len(group)]
     value = middle(groups, np.mean)
@@ -212,7 +214,7 @@ def share(groups: Sequence[Sequence[float]]) -> list[float]:
 def middle(
     groups: Sequence[Sequence[float]], statistic: Callable[[Array], Any]
 ) -> list[float]:
-    """Return a statistic of values in groups with its 95 % interval, by a jackknife."""
+    """Return a statistic of values in groups with its 95 % jackknife interval."""
     groups = [group for group in groups if len(group)]
     if not groups:
         return [NAN] * 3

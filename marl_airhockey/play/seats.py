@@ -1,4 +1,4 @@
-"""Seats of a match: which page has which, and how people steer their paddles."""
+"""Seats of a match, the pages that have them, and the input of the pages."""
 
 from __future__ import annotations
 
@@ -14,33 +14,36 @@ from marl_airhockey.play.real_match import RealMatch
 from marl_airhockey.sim.core.recording import Columns
 
 IDLE = 60.0
-"""Time without a movement after which a person counts as idle, s."""
+"""Time without a movement after which a person is idle, s."""
 LET_GO = 0.3
-"""Time without news of a held pointer after which a real arm rests, s"""
+"""Time without a message of a pointer that is held down after which an arm rests, s."""
 
 
 class Seats:
     """Pages of a match and their seats.
 
     Args:
-        match: Match whose paddles they steer.
+        match: Match whose paddles the pages move.
     """
 
     def __init__(self, match: LiveMatch) -> None:
         self.match = match
         self.clients: set[Client] = set()
-        """Connected pages, with a seat or without."""
+        """Connected pages, with or without a seat."""
 
     @property
     def free(self) -> list[int]:
-        """Seats for people that nobody has taken."""
+        """Indices of the seats for people that no page has taken."""
         taken = {client.seat for client in self.clients}
         names = enumerate(self.match.drivers.names)
         return [i for i, name in names if name == PERSON and i not in taken]
 
     @property
     def players(self) -> list[dict[str, Any]]:
-        """Driver, person's pseudonym and consent of each seat; None for others."""
+        """Driver, and pseudonym and consent of the person, of each seat.
+
+        Pseudonym and consent are None for other drivers.
+        """
         people = {c.seat: (c.name, c.consent) for c in self.clients}
         rows = []
         for i, driver in enumerate(self.match.drivers.names):
@@ -52,15 +55,16 @@ class Seats:
 
     @property
     def devices(self) -> list[dict[str, Any] | None]:
-        """What the page at each seat says of its devices; None for others."""
+        """Devices that the page of each seat reports; None for seats without a page."""
         found = {c.seat: c.device for c in self.clients}
         return [found.get(i) for i in range(len(self.match.seats))]
 
     @property
     def columns(self) -> Columns:
-        """Columns of a recording: what pages do now, by seat; nan where it is unknown.
+        """Columns of a recording with the input of pages, by seat; nan if unknown.
 
-        ``round_trip`` (seats,), ms; ``pointer`` (seats, 2), last aim, table frame, m.
+        ``round_trip`` is (seats,), ms. ``pointer`` is the last aim (seats, 2), table
+        frame, m.
         """
         seats = len(self.match.seats)
         trips, pointers = np.full(seats, np.nan), np.full((seats, 2), np.nan)
@@ -71,15 +75,15 @@ class Seats:
         return {"round_trip": trips, "pointer": pointers}
 
     def may_control(self, client: Client) -> bool:
-        """Return True for pages with a seat, and for all if no people play."""
+        """Return True for pages with a seat, and for all pages if no people play."""
         return client.seat is not None or PERSON not in self.match.drivers.names
 
     def take(self, client: Client, seat: int) -> None:
-        """Give a page a seat."""
+        """Assign a seat to a page."""
         client.seat, client.last_input = seat, time.monotonic()
 
     def leave(self, client: Client, reason: str) -> None:
-        """Take a page's seat away and pause the match."""
+        """Free the seat of a page and pause the match."""
         assert client.seat is not None
         mouse: Any = self.match.drivers.input_device(client.seat, "mouse")
         mouse.rest()
@@ -87,18 +91,18 @@ class Seats:
         self.match.pause(reason)
 
     def is_idle(self, client: Client, now: float) -> bool:
-        """Return True for a page with a seat whose person has not moved for `IDLE`."""
+        """Return True for a page with a seat and no movement for `IDLE`."""
         return client.seat is not None and now - client.last_input > IDLE
 
     def aim(
         self, client: Client, x: float, y: float, held: int, q: int, rtt: float
     ) -> None:
-        """Set the target of a page's paddle, table frame, m; a message of pages.
+        """Set the target of a page's paddle; handler of a message.
 
         Args:
-            client: Page.
-            x: Target.
-            y: Target.
+            client: Page that sent the message.
+            x: Target position along x, table frame, m.
+            y: Target position along y, table frame, m.
             held: 1 while the pointer is held down.
             q: Number of the message.
             rtt: Last round trip, ms; 0 if unknown.
@@ -117,7 +121,10 @@ class Seats:
         client.acknowledged, client.round_trip = q, rtt if rtt > 0.0 else None
 
     def stick(self, client: Client, x: float, y: float, q: int, rtt: float) -> None:
-        """Set the tilt of a page's stick, shares of full tilt; a message of pages."""
+        """Set the tilt of a page's stick, fractions of full tilt; handler of a message.
+
+        The components are along the axes of the table frame.
+        """
         if client.seat is None:
             return
         gamepad: Any = self.match.drivers.input_device(client.seat, "gamepad")
@@ -128,7 +135,7 @@ class Seats:
         client.acknowledged, client.round_trip = q, rtt if rtt > 0.0 else None
 
     def rest_unheld(self, now: float) -> None:
-        """Let paddles rest whose person holds nothing, or is not heard any more."""
+        """Stop paddles whose pointer is released, or whose page is silent."""
         drivers = self.match.drivers
         for client in self.clients:
             if client.seat is not None and now - client.last_held > LET_GO:

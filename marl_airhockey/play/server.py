@@ -1,4 +1,4 @@
-"""Web application of a session or a recording: one page, one WebSocket."""
+"""Web application of a session or a recording, with one page and one WebSocket."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from marl_airhockey.play.session import Session
 
 WEB = Path(__file__).parent / "web"
 STALLED = 10.0
-"""Time after which a page that takes no frame is disconnected, s."""
+"""Time after which a page that does not receive a frame is disconnected, s."""
 MAX_CLIENTS = 200
-"""Most pages at once."""
+"""Largest number of connected pages."""
 
 
 def _page(access: AccessCheck, mode: str, *routes: BaseRoute) -> list[BaseRoute]:
@@ -46,7 +46,7 @@ def replay(path: Path, access: AccessCheck) -> Starlette:
     """Return the web application that shows a recording.
 
     Raises:
-        ValueError: no recording, or one without steps.
+        ValueError: The path is not a recording, or it has no steps.
     """
     recording = replay_of(path)
 
@@ -59,7 +59,7 @@ def replay(path: Path, access: AccessCheck) -> Starlette:
 
 
 def application(session: Session, access: AccessCheck) -> Starlette:
-    """Return the web application of a session, whose loop runs as long as it does."""
+    """Return the web application of a session, which also runs the loop of ticks."""
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -76,7 +76,7 @@ def application(session: Session, access: AccessCheck) -> Starlette:
             await socket.close(1008, bytes(refusal.body).decode().strip())
             return
         if len(session.clients) >= MAX_CLIENTS:
-            await socket.close(1013, "too many are watching")
+            await socket.close(1013, "too many pages are connected")
             return
         await socket.accept()
         client = session.connect(remote=access.is_remote(socket))
@@ -103,10 +103,10 @@ def application(session: Session, access: AccessCheck) -> Starlette:
         return Response(packed, media_type="image/jpeg")
 
     async def video(socket: WebSocket) -> None:
-        """Send the table from above, each picture when the last one was drawn."""
+        """Send the table from above, each frame after the page has drawn the last."""
         match = session.match
         if access.refusal(socket) or not isinstance(match, RealMatch):
-            await socket.close(1008, "there is no video here")
+            await socket.close(1008, "this match has no video")
             return
         await socket.accept()
         number = -1
@@ -132,14 +132,14 @@ def application(session: Session, access: AccessCheck) -> Starlette:
 
 
 def _note_failure(session: Session, task: asyncio.Task[None]) -> None:
-    """Stop the server when the loop has failed: nobody plays at a dead table."""
+    """Stop the server if the loop of ticks has failed."""
     if not task.cancelled():
         session.failure = task.exception()
         signal.raise_signal(signal.SIGINT)
 
 
 async def _write(socket: WebSocket, session: Session, client: Client) -> None:
-    """Send a page the newest frame whenever the last one has been sent."""
+    """Send the newest frame to a page whenever the last one has been sent."""
     try:
         await socket.send_json({"t": "match", **session.describe()})
         while True:

@@ -1,4 +1,4 @@
-"""Session: a match in real time, which is recorded and sent to connected pages."""
+"""Session: a match in real time that is recorded and sent to connected pages."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.sim.core.recording import PLAYED
 
 BEHIND = 6
-"""Ticks that the loop makes up for when it is late; more are skipped."""
+"""Largest number of ticks that a delayed loop catches up; others are skipped."""
 ASIDE = 0.1
-"""Time after which pages get a frame even if a real table is not yet ready, s."""
+"""Time after which pages receive a frame while a real table is not ready, s."""
 
 
 class Session:
     """Session to which pages connect and send messages.
 
     Args:
-        host: Host, which has the match and decides what pages may do.
+        host: Host with the match, which defines what pages may do.
     """
 
     def __init__(self, host: Host) -> None:
         self.host, self.match, self._seats = host, host.match, host.seats
         self.rate = float(RATE)
-        """Ticks a second, over the last second."""
+        """Number of ticks in the last second, 1/s."""
         self._recorded: list[dict[str, Any]] = []
-        """Value of `Seats.players` when the recording of this episode began."""
+        """Value of `Seats.players` at the start of the recording of this episode."""
         self._frames = 0
         self.failure: BaseException | None = None
-        """Exception that ended the loop, if one did."""
+        """Exception that ended the loop, if any."""
 
     @property
     def clients(self) -> set[Client]:
@@ -45,13 +45,13 @@ class Session:
         return self._seats.clients
 
     def connect(self, remote: bool = False) -> Client:
-        """Add a page; it gets a seat when it has said hello.
+        """Add a page; it gets a seat after its message "hello".
 
         Args:
-            remote: Whether it is on another machine.
+            remote: True for a page on another machine.
         """
         client = Client()
-        # A real arm takes motion from its own machine alone; all others watch.
+        # Only pages on the same machine can move a real arm; other pages watch.
         client.watches = remote and isinstance(self.match, RealMatch)
         self.clients.add(client)
         return client
@@ -65,7 +65,7 @@ class Session:
         """Handle a message.
 
         Raises:
-            ValueError: One that no page of ours sends, or too many of them.
+            ValueError: The message is invalid, or the page sends too many messages.
         """
         self.host.before_message()
         client.limiter.acquire(time.monotonic())
@@ -76,16 +76,16 @@ class Session:
         elif kind == "device":
             client.device = fields
         elif kind not in handlers:
-            raise ValueError(f"{kind}: not at this table")
+            raise ValueError(f"{kind}: this table does not accept this message")
         elif not client.watches:
             handlers[kind](client, **fields)
 
     def describe(self) -> dict[str, Any]:
-        """Return what a page gets once; JSON."""
+        """Return the JSON that a page receives once."""
         return self.host.describe()
 
     async def run(self) -> None:
-        """Tick for ever, in real time."""
+        """Run the loop of ticks in real time, without end."""
         due = time.perf_counter()
         mark, count = due, 0
         while True:
@@ -108,7 +108,7 @@ class Session:
         self._share(self.match.tick())
 
     async def _tick_aside(self, match: RealMatch) -> None:
-        """Advance a match on a real table, in a thread, as that takes its time."""
+        """Advance a match on a real table in a thread, because this can take long."""
         match.watched = bool(self.clients)
         self._seats.rest_unheld(time.monotonic())
         ticking = asyncio.ensure_future(asyncio.to_thread(match.tick))
@@ -126,7 +126,7 @@ class Session:
         self.host.after_tick()
 
     def _record(self, recorder: Recorder, moved: bool) -> None:
-        """Write the tick; a match whose players change is not played to the end."""
+        """Record the tick; a match whose players change ends the recording."""
         match, players = self.match, self._seats.players
         if moved and match.ticks == 1:
             self._recorded = players
@@ -139,7 +139,7 @@ class Session:
             recorder.end(match, match.reason or PLAYED)
 
     def _broadcast(self) -> None:
-        """Give every page a new frame; one that was not sent in time is dropped."""
+        """Set the newest frame of every page; it replaces a frame that was not sent."""
         status = {**self._status(), **self.host.status()}
         self._frames += 1
         shared = {"t": "state", "f": self._frames, **self.match.state(), **status}
@@ -153,7 +153,7 @@ class Session:
             client.frame_ready.set()
 
     def _status(self) -> dict[str, Any]:
-        """Return what all pages get about players, the handicap and the server."""
+        """Return the data about players, handicap and server for all pages."""
         drivers, recorder = self.match.drivers, self.host.recorder
         presets = {preset: name for name, preset in PRESETS.items()}
         film = [recorder.trouble] if recorder is not None else []

@@ -1,1 +1,1 @@
-"""Policies as drivers: from npz, SB3 and ONNX files, torch modules and functions."""
+"""Policies as drivers: .npz, SB3 and ONNX files, torch modules and functions."""

@@ -1,4 +1,4 @@
-"""Callables as drivers: functions, models with ``predict``, torch modules."""
+"""Drivers from functions, models with ``predict`` and torch modules."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from marl_airhockey.types import Array
 
 @dataclass
 class OwnPolicy(Policy):
-    """Policy of a user: it takes a batch of observations or one at a time.
+    """Policy of a user, which accepts a batch of observations or a single one.
 
-    `check` finds out which, by a call with three observations of zeros and, if that
-    fails, with one.
+    `check` determines which. It calls the policy with three observations of zeros and,
+    if that fails, with one.
     """
 
     one_by_one: bool = False
-    """True if it takes one observation at a time"""
+    """True if it accepts one observation at a time."""
 
     def check(self, observation: Any) -> None:
         shape = _shape(observation)
@@ -37,8 +37,8 @@ class OwnPolicy(Policy):
             self.one_by_one = True
             return
         raise ValueError(
-            f"{self.source} is no player of this environment: for observations of "
-            f"shape {shape} it gave {_text(many)}, for one of them {_text(one)}; "
+            f"{self.source} cannot act in this environment: for observations of shape "
+            f"{shape} it returned {_text(many)}, for one of them {_text(one)}; "
             f"expected finite actions of shape ({shape[0]}, 2) or (2,)"
         )
 
@@ -51,16 +51,19 @@ class OwnPolicy(Policy):
 
 
 def driver_of(player: object) -> Driver:
-    """Return a player of any kind as a driver.
+    """Create a driver from an object.
 
     Args:
-        player: `Driver` or a class of drivers; a torch module or a function from
-            observations (B, D) to actions (B, 2), or from one (D,) to (2,); an object
-            with ``predict(observation, deterministic=True)``, as the models of
-            stable-baselines3 have, or ``predict(observation)``.
+        player: One of the following.
+
+            - Object or class of a `Driver`.
+            - Torch module or function from observations (B, D) to actions (B, 2), or
+              from one observation (D,) to one action (2,).
+            - Object with ``predict(observation, deterministic=True)``, such as a model
+              of stable-baselines3, or with ``predict(observation)``.
 
     Raises:
-        ValueError: None of these.
+        ValueError: The object is none of these.
     """
     if isinstance(player, Driver):
         return player
@@ -72,7 +75,7 @@ def driver_of(player: object) -> Driver:
         return OwnPolicy(_Network(player), source=source)
     if isinstance(player, type):
         raise ValueError(
-            f"{source}: a class that is no Driver; give an object of it instead"
+            f"{source}: the class is not a Driver; give an object of it instead"
         )
     if callable(getattr(player, "predict", None)):
         known = model_environment(player)
@@ -80,15 +83,15 @@ def driver_of(player: object) -> Driver:
     if callable(player):
         return OwnPolicy(_Function(player), source=source)
     raise ValueError(
-        f"{source} {player!r:.60} is no player: give a driver's name, the path of a "
-        "policy, a function from observation to action, an object with predict(), a "
-        "torch module or a Driver"
+        f"{source} {player!r:.60} is not a driver: give the name of a driver, the path "
+        "of a policy, a function from observation to action, an object with predict(), "
+        "a torch module or a Driver"
     )
 
 
 @dataclass
 class _Function:
-    """Function of an observation alone."""
+    """Prediction by a function of the observation."""
 
     function: Callable[[Any], Any]
 
@@ -98,7 +101,7 @@ class _Function:
 
 @dataclass
 class _Model:
-    """Object with ``predict``."""
+    """Prediction by an object with ``predict``."""
 
     model: Any
 
@@ -109,20 +112,20 @@ class _Model:
             if "deterministic" not in str(error):
                 raise
             said = self.model.predict(observation)
-        # stable-baselines3 gives the state of a recurrent network as well.
+        # Stable-baselines3 also returns the state of a recurrent network.
         if isinstance(said, tuple):
             said, state = said
             if state is not None:
                 raise ValueError(
-                    "a recurrent policy keeps a state between steps; write a Driver "
-                    "whose memory holds it"
+                    "a recurrent policy has a state between steps; write a Driver that "
+                    "stores it in its memory"
                 )
         return np.asarray(said)
 
 
 @dataclass
 class _Network:
-    """Torch module."""
+    """Prediction by a torch module."""
 
     module: Any
 
@@ -138,7 +141,7 @@ class _Network:
 
 
 def _ask(predict: Callable[[Any, bool], Array], observation: Any) -> Array | Exception:
-    """Return the answer of a policy, or the error that it raised."""
+    """Return the actions of a policy, or the error that it raised."""
     try:
         return np.asarray(predict(observation, True))
     except Exception as error:
@@ -146,7 +149,7 @@ def _ask(predict: Callable[[Any, bool], Array], observation: Any) -> Array | Exc
 
 
 def _are_actions(answer: Array | Exception, shape: tuple[int, ...]) -> bool:
-    """Return True for finite real numbers of a shape."""
+    """Return True for an array of finite real numbers with a shape."""
     if isinstance(answer, Exception) or answer.dtype.kind not in "iuf":
         return False
     return answer.shape == shape and bool(np.isfinite(answer).all())

@@ -1,4 +1,4 @@
-"""Load policies: runs of `train`, any SB3 zip, ONNX models and .npz files."""
+"""Loading of policies: run folders, zips of SB3, ONNX models and .npz files."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from marl_airhockey.policies.runs import policies_of
 from marl_airhockey.policies.sb3 import load_sb3
 
 ZOO = Path(__file__).parents[1] / "zoo"
-"""Folder of the trained policies that come with the library"""
+"""Folder of the trained policies of this library."""
 
 
 def policy_file(path: str | Path) -> Path:
-    """Return the file of a policy, of a run's folder or of ``zoo/NAME``."""
+    """Return the policy file for its path, a run folder or ``zoo/NAME``."""
     path = Path(path)
     if path.parent == Path("zoo") and not path.exists():
         path = ZOO / f"{path.name}.npz"
@@ -28,21 +28,21 @@ def policy_file(path: str | Path) -> Path:
 def load_policy(
     path: str | Path, deterministic: bool = True, trust: bool | None = None
 ) -> Policy:
-    """Load a policy: a run of `train`, an SB3 .zip, an .onnx, an .npz, or ``zoo/NAME``.
+    """Load a policy: a run folder, a zip of SB3, an .onnx, an .npz, or ``zoo/NAME``.
 
-    An SB3 zip of our training is read as plain weights. Any other holds pickled Python,
-    which runs when it is loaded.
+    A zip of `airhockey train`, except for images, is read as plain weights. Any other
+    zip contains pickled Python code, which runs when it is loaded.
 
     Args:
         path: Path of the file or folder.
-        deterministic: Whether to return mean actions instead of samples.
-        trust: Whether pickled Python in this file may run; None to ask at a terminal
-            and refuse elsewhere.
+        deterministic: True to return mean actions, False to return samples.
+        trust: True to allow pickled Python code in this file to run. None to ask at a
+            terminal, and to raise an error elsewhere.
 
     Raises:
-        ValueError: A file of another kind; the message names the expected ones; or one
-            with pickled Python that is not trusted.
-        RuntimeError: A missing extra; the message holds the command that installs it.
+        ValueError: There is no such file, it is of another kind, or it contains Python
+            code that is not trusted.
+        RuntimeError: An extra is missing. The message states how to install it.
     """
     path = policy_file(path)
     if not path.exists():

@@ -1,4 +1,4 @@
-"""NumPy policy: a learned network as plain arrays, in one small file."""
+"""Learned network as NumPy arrays, in one small file."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
 LARGEST = 64_000_000
-"""Largest number of bytes that the arrays of a file may take."""
+"""Largest total size of the arrays of a file, bytes."""
 MOST = 100
 """Largest number of arrays in a file."""
 FEW_ROWS = 8
-"""Number of observations for which BLAS takes one thread anyway"""
+"""Largest number of observations for which BLAS uses one thread anyway."""
 
 
 @cache
@@ -41,11 +41,12 @@ class NumpyPolicy:
 
     Args:
         layers: Weights (out, in) and biases (out,) of each layer.
-        centre: Centre (D,), subtracted from the observation.
-        unit: Divisor (D,) of the difference.
-        log_std: Log standard deviation (2,) of the action noise in training.
-        card: Scenario and its version, settings and results of the training; with
-            "bounded", the hyperbolic tangent follows the last layer.
+        centre: Centre (D,), which is subtracted from the observation.
+        unit: Scale (D,), by which the difference is divided.
+        log_std: Logarithm of the standard deviation (2,) of the action noise in
+            training.
+        card: Scenario and its version, settings and results of the training. With the
+            entry "bounded", tanh is applied to the output of the last layer.
     """
 
     layers: Sequence[tuple[Array, Array]]
@@ -59,15 +60,15 @@ class NumpyPolicy:
     ) -> Array:
         """Return mean actions (B, 2) for observations (B, D); the driver adds noise.
 
-        Goals that are given apart follow the rest, as in a dict of gymnasium's.
+        In a dictionary, the achieved and the desired goal follow the observation.
         """
         if isinstance(observation, Mapping):
             parts = ("observation", "achieved_goal", "desired_goal")
             observation = np.concatenate([observation[part] for part in parts], -1)
         if len(observation) <= FEW_ROWS:
             return self._forward(observation)
-        # Threads of BLAS busy-wait for each other: for layers as small as these they
-        # cost twice the CPU time on two cores, and more on more cores.
+        # Threads of BLAS busy-wait for each other. For layers of this size they need
+        # twice the CPU time on two cores, and more on more cores.
         with _blas().limit(limits=1, user_api="blas"):
             return self._forward(observation)
 
@@ -106,7 +107,7 @@ class NumpyPolicy:
         """Read a file that `save` wrote.
 
         Raises:
-            ValueError: A file of another kind.
+            ValueError: The file is of another kind.
         """
         try:
             arrays = _read(path)
@@ -118,55 +119,56 @@ class NumpyPolicy:
             found._check()
         except KeyError as error:
             words = f"the array {error} is missing"
-            raise ValueError(f"{path} is no policy of ours: {words}") from error
-        except Exception as error:  # Whatever a broken or hostile file makes of it.
-            raise ValueError(f"{path} is no policy of ours: {error}") from error
+            raise ValueError(f"{path} is not a policy file: {words}") from error
+        except Exception as error:  # A broken or hostile file can raise any error.
+            raise ValueError(f"{path} is not a policy file: {error}") from error
         return found
 
     def _check(self) -> None:
-        """Refuse layers whose shapes do not match, and elements that are no number.
+        """Check that the shapes of layers match and that elements are finite.
 
         Raises:
-            ValueError: One of these, named.
+            ValueError: A check fails. The message names it.
         """
         size = self.centre.size
         if self.centre.shape != (size,) or self.unit.shape != (size,):
             raise ValueError("centre and unit must be (D,)")
         for weight, bias in self.layers:
             if weight.shape != (len(bias), size) or bias.ndim != 1:
-                raise ValueError(f"a layer of {weight.shape} follows {size} numbers")
+                raise ValueError(f"layer of shape {weight.shape} after {size} numbers")
             size = len(bias)
         if size != 2 or self.log_std.shape != (2,) or not self.layers:
-            raise ValueError("its actions are not (2,)")
+            raise ValueError("its actions do not have the shape (2,)")
         arrays = [self.centre, self.unit, self.log_std, *sum(self.layers, ())]
         if not all(a.dtype.kind == "f" and np.isfinite(a).all() for a in arrays):
             raise ValueError("every element must be a finite number")
         if not isinstance(self.card, Mapping):
-            raise ValueError("its card is no object")
+            raise ValueError("its card is not an object")
         observe = self.card.get("observe")
         if (self.unit == 0.0).any() or not isinstance(observe, (str, type(None))):
-            raise ValueError("a unit is 0, or `observe` is no text")
+            raise ValueError("a unit is 0, or `observe` is not a text")
 
 
 def _read(path: Path) -> dict[str, Array]:
-    """Read the arrays of an .npz, of numbers or text, with no more memory than that.
+    """Read the arrays of an .npz, in no more memory than they need.
 
     Raises:
-        ValueError: Too large, or other contents than arrays of numbers or text.
+        ValueError: The file is too large, or contains anything except arrays of numbers
+            or text.
     """
     arrays: dict[str, Array] = {}
     with path.open("rb") as file:
         if file.read(4) != b"PK\x03\x04":
-            raise ValueError("it is no .npz")
+            raise ValueError("it is not an .npz file")
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()
         total = sum(member.file_size for member in members)
         if total > LARGEST or len(members) > MOST:
-            raise ValueError(f"{len(members)} arrays of {total:,} bytes are too much")
+            raise ValueError(f"{len(members)} arrays of {total:,} bytes are too large")
         for member in members:
             content = io.BytesIO(archive.read(member))
             if np.lib.format.read_magic(content) != (1, 0):
-                raise ValueError(f"{member.filename}: another version of the format")
+                raise ValueError(f"{member.filename}: unknown version of the format")
             shape, fortran, dtype = np.lib.format.read_array_header_1_0(content)
             rest = content.read()
             if dtype.kind not in "fU" or min(shape, default=0) < 0:

@@ -1,4 +1,4 @@
-"""ONNX models as policies."""
+"""Policies from ONNX models."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from marl_airhockey.sim.core.errors import require
 from marl_airhockey.types import Array
 
 ONNX_CARD = "card"
-"""Name of the metadata of an ONNX model that holds the card of a policy of ours"""
+"""Key of the metadata of an ONNX model that contains the card of a policy."""
 
 
 class _OnnxModel:
-    """ONNX model; copies and pickles hold its bytes and open a new session."""
+    """ONNX model. Copies and pickles contain its bytes and open a new session."""
 
     def __init__(self, source: str, content: bytes) -> None:
         self._source, self._content = source, content
@@ -42,7 +42,7 @@ class _OnnxModel:
 
     @property
     def card(self) -> dict[str, Any]:
-        """Card of a policy of ours; empty for other models."""
+        """Card of a policy of this library; empty for other models."""
         metadata = self._session.get_modelmeta().custom_metadata_map
         try:
             found = json.loads(metadata.get(ONNX_CARD, "{}"))
@@ -52,7 +52,7 @@ class _OnnxModel:
 
     def __call__(self, observation: Any, deterministic: bool) -> Array:
         rows = np.asarray(observation, np.float32)
-        if self.inputs[0].shape[0] == 1:  # Its batch is fixed.
+        if self.inputs[0].shape[0] == 1:  # Its batch size is fixed.
             return np.concatenate([self._actions(row[None]) for row in rows])
         return self._actions(rows)
 
@@ -66,10 +66,10 @@ class _OnnxModel:
         return out
 
     def check(self) -> None:
-        """Refuse a model that cannot be a policy.
+        """Check that the model can be a policy.
 
         Raises:
-            ValueError: What it takes or gives is something else; the message says what.
+            ValueError: The inputs or outputs are different. The message names them.
         """
         expected = f"{self._source}: expected one input, float32 (B, D)"
         if len(self.inputs) != 1:
@@ -79,7 +79,7 @@ class _OnnxModel:
             raise ValueError(f"{expected}; found {kind} of shape {shape}")
         if isinstance(shape[0], int) and shape[0] != 1:
             raise ValueError(
-                f"{expected}; its batch is fixed to {shape[0]}: export it with a "
+                f"{expected}; its batch size is fixed to {shape[0]}: export it with a "
                 "dynamic first axis, or with 1"
             )
         if all(isinstance(size, int) for size in shape[1:]):
@@ -89,11 +89,11 @@ class _OnnxModel:
 def load_onnx(path: Path, deterministic: bool) -> Policy:
     """Load an ONNX model with one input, observations (B, D), as a policy.
 
-    One whose batch is fixed to 1 gets a row at a time.
+    A model with a fixed batch size of 1 is called for one row at a time.
 
     Raises:
-        ValueError: Another kind of file or model.
-        RuntimeError: onnxruntime is missing; the message says how to install it.
+        ValueError: The file or the model is of another kind.
+        RuntimeError: onnxruntime is missing. The message states how to install it.
     """
     require("onnxruntime", "offline")
     try:

@@ -1,4 +1,4 @@
-"""Policy: a learned policy as a driver, and the environment of its training."""
+"""Learned policy as a driver, and the environment of its training."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from marl_airhockey.sim.contracts.driver import Driver, View
 from marl_airhockey.types import Array
 
 Predict = Callable[[Any, bool], Array]
-"""Function of observations (B, ...) and whether to return mean actions."""
+"""Function (observations (B, ...), deterministic) -> actions (B, 2)."""
 
 
 @dataclass
 class Policy(Driver):
     """Learned policy as a driver.
 
-    Outside of environments, ``predict`` is the policy itself: it takes observations
-    (B, D) of the environment of its training and whether to return the mean action, and
-    returns actions (B, 2), fractions of top speed in the ego frame. They can be a
-    little outside -1 .. 1, where environments clip them.
+    Call ``predict`` to use the policy outside of environments. Its arguments are
+    observations (B, D) of the training environment, and True for mean actions. It
+    returns actions (B, 2), fraction of top speed, ego frame. They can be slightly
+    outside -1 to 1, where environments clip them.
 
     Args:
-        predict: Function (observation (B, ...), deterministic) -> action (B, 2).
-        shape: Shape of the observation that it was trained on; None if unknown.
-        observe: Form of that observation; None for the environment's.
+        predict: Function (observations (B, ...), deterministic) -> actions (B, 2).
+        shape: Shape of an observation in training; None if unknown.
+        observe: Observation type in training; None for the type of the environment.
         source: Origin of the policy, for messages.
-        deterministic: Whether to return the mean action instead of a sample.
+        deterministic: True to act with mean actions, False to act with samples.
     """
 
     predict: Predict
@@ -39,9 +39,9 @@ class Policy(Driver):
     source: str = "policy"
     deterministic: bool = True
     noise: Array | None = None
-    """Standard deviation of sampled actions (2,), if `predict` returns only means"""
+    """Standard deviation of sampled actions (2,), if `predict` returns only means."""
     can_sample: bool = True
-    """False if it has a mean action alone, as ONNX models"""
+    """False if it returns only mean actions, as ONNX models do."""
     trained_in: Mapping[str, Any] = field(default_factory=dict)
 
     def act(
@@ -51,7 +51,7 @@ class Policy(Driver):
         if self.noise is not None and not self.deterministic:
             action += self.noise * view.rng.normal(2)
         if not np.isfinite(action).all():
-            raise ValueError(f"{self.source}: its actions are nan or inf")
+            raise ValueError(f"{self.source}: an action is nan or inf")
         return np.clip(action, -1.0, 1.0), memory
 
     def check(self, observation: Array | Mapping[str, Array]) -> None:
@@ -63,8 +63,8 @@ class Policy(Driver):
             scenario = self.trained_in.get("scenario")
             where = f"it was trained on {scenario}; " if scenario else ""
             raise ValueError(
-                f"{self.source}: it expects observations of shape {self.shape}, "
-                f"this environment gives {shape}; {where}check the scenario and its "
+                f"{self.source}: it expects observations of shape {self.shape}, this "
+                f"environment returns {shape}; {where}check the scenario and its "
                 "options (observe, goals, reaction, seats)"
             )
 
@@ -81,15 +81,15 @@ TRAINED_IN: dict[str, type | tuple[type, ...]] = {
     "control_dt": (int, float),
     "goals": str,
 }
-"""Entries that describe the environment of a training, and their types"""
+"""Entries that describe the environment of a training, and their types."""
 
 
 def trained_in(card: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the environment that a policy's card or a run's settings name.
+    """Return the training environment from a policy's card or a run's settings.
 
     Returns:
-        The scenario's name, and keywords of environments; entries of another type are
-        left out, as files come from anywhere.
+        Name of the scenario, and keywords of the environment. Entries of another type
+        are left out, because a file can contain anything.
     """
     return {
         name: card[name]

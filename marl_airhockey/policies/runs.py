@@ -1,14 +1,14 @@
-"""Runs of training: the files of their policies, and their format."""
+"""Run folders of training: their format and the files of their policies."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 RUN_FORMAT = 2
-"""Format of a run's folder, in its ``config.toml`` and in the card of its zips.
+"""Format of a run folder, stored in its ``config.toml`` and in the card of its zips.
 
-Raised whenever classes that a run pickles, or settings that it names, move: runs of
-another format are refused.
+It increases whenever pickled classes or named settings move. Runs of another format
+raise an error.
 """
 KINDS = ("npz", "onnx", "zip")
 """File name extensions of the policies that engines write, the safe one first."""
@@ -20,10 +20,10 @@ def policies_of(run: Path) -> list[Path]:
 
 
 def check_run_format(source: Path, found: int) -> None:
-    """Refuse a run of another format than `RUN_FORMAT`.
+    """Check that a run has the format `RUN_FORMAT`.
 
     Raises:
-        ValueError: Another format.
+        ValueError: It has another format.
     """
     if found != RUN_FORMAT:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""Models of stable-baselines3 as policies; those of our training as plain weights."""
+"""Policies from models of stable-baselines3."""
 
 from __future__ import annotations
 
@@ -24,12 +24,14 @@ from marl_airhockey.types import Array
 def load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
     """Load a zip of stable-baselines3 as a policy.
 
-    A zip of our training on numbers is read as plain weights; any other one holds
-    pickled Python, which runs if it is trusted, see `trust.require_trust`.
+    A zip of `airhockey train`, except for images, is read as plain weights. Any other
+    zip contains pickled Python code, which runs if it is trusted, see
+    `trust.require_trust`.
 
     Raises:
-        ValueError: Another kind of file or model, or one that is not trusted.
-        RuntimeError: stable-baselines3 is missing; says how to install it.
+        ValueError: The file or the model is of another kind, or it is not trusted.
+        RuntimeError: stable-baselines3 is missing. The message states how to install
+            it.
     """
     require("stable_baselines3", "train")
     wrong = f"{path}: not a stable-baselines3 policy"
@@ -40,7 +42,7 @@ def load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
     except (zipfile.BadZipFile, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{wrong} ({error})") from error
     card = data.get("card")
-    if isinstance(card, dict):  # of our own training
+    if isinstance(card, dict):  # A zip of this library.
         check_run_format(path, card.get("run_format", 1))
         if card.get("observe") != "pixels":
             own = numpy_actor(load_weights(path), card)
@@ -53,13 +55,13 @@ def load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
     if not kinds:
         raise ValueError(f"{wrong} of PPO, A2C, SAC, TD3 or DDPG (found {module})")
     try:
-        # Training schedules are dropped: a policy does not need them.
+        # A policy does not need the schedules of training.
         plain = {"lr_schedule": lambda _: 0.0, "clip_range": lambda _: 0.0}
         model = kinds[0].load(path, device="cpu", custom_objects=plain)
     except Exception as error:
         raise ValueError(f"{wrong}: {error}") from error
     if model.action_space.shape != (2,):
-        raise ValueError(f"{path}: its action space is {model.action_space}, not (2,)")
+        raise ValueError(f"{path}: action space {model.action_space}; expected (2,)")
     card = getattr(model, "card", {})
 
     return Policy(
@@ -73,11 +75,11 @@ def load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
 
 
 def model_environment(model: Any) -> dict[str, Any]:
-    """Return the environment that a model was trained in, see `trained_in`.
+    """Return the environment in which a model was trained, see `trained_in`.
 
     Args:
-        model: Model of stable-baselines3, or anything with a ``card`` or an
-            ``observation_space``.
+        model: Model of stable-baselines3, or another object that may have a ``card`` or
+            an ``observation_space``.
     """
     card = getattr(model, "card", None)
     known = trained_in(card if isinstance(card, Mapping) else {})
@@ -92,14 +94,14 @@ def _predict_sb3(policy: Any, observation: Any, deterministic: bool) -> Array:
 
 
 def numpy_actor(weights: Mapping[str, Any], card: Mapping[str, Any]) -> NumpyPolicy:
-    """Return the actor of a model of our training as plain arrays.
+    """Return the actor of a model that this library trained, as plain arrays.
 
     Args:
         weights: Tensors by their names in the model's policy.
         card: Card of the policy.
 
     Raises:
-        ValueError: Another kind of model: pixels, other layers.
+        ValueError: The model is for images, or has other layers.
     """
     layers = [f"mlp_extractor.policy_net.{2 * i}" for i in range(len(weights))]
     layers = [*(name for name in layers if f"{name}.weight" in weights), "action_net"]
@@ -109,16 +111,16 @@ def numpy_actor(weights: Mapping[str, Any], card: Mapping[str, Any]) -> NumpyPol
         return policy_of_weights(weights, layers, scale, weights["log_std"], card)
     except KeyError as error:
         raise ValueError(
-            f"no .npz holds this policy (it has no {error}): only those on flat "
-            "observations or goals, with ReLU layers"
+            f"this policy cannot be stored as .npz (it has no {error}); expected one "
+            "for flat observations or goals, with ReLU layers"
         ) from error
 
 
 def load_weights(path: Path) -> Mapping[str, Any]:
-    """Read the tensors of a zip of stable-baselines3, running nothing in it.
+    """Read the tensors of a zip of stable-baselines3 without running code in it.
 
     Raises:
-        ValueError: A zip with other contents.
+        ValueError: The zip has other contents.
     """
     import torch
 
@@ -127,6 +129,6 @@ def load_weights(path: Path) -> Mapping[str, Any]:
             content = io.BytesIO(archive.read("policy.pth"))
         found = torch.load(content, map_location="cpu", weights_only=True)
         return dict(found)
-    except Exception as error:  # Whatever a broken or hostile file makes of it.
+    except Exception as error:  # A broken or hostile file can raise any error.
         kind = type(error).__name__
-        raise ValueError(f"{path}: it holds no plain weights ({kind})") from error
+        raise ValueError(f"{path}: it contains no plain weights ({kind})") from error

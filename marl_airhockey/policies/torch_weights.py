@@ -1,4 +1,4 @@
-"""Weights of torch as NumPy policies; torch itself is not imported."""
+"""NumPy policies from weights of torch, without an import of torch."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ def policy_of_weights(
     log_std: Any,
     card: Mapping[str, Any],
 ) -> NumpyPolicy:
-    """Return linear layers, with rectifiers between them, as a NumPy policy.
+    """Return linear layers, with ReLU between them, as a NumPy policy.
 
     Args:
         weights: Tensors by name, as in a ``state_dict``.
-        layers: Names of the layers: ``NAME.weight`` and ``NAME.bias`` are theirs.
-        scale: Centre and unit (D,) of the flat observation, tensors; goals that follow
-            it are taken as they are.
-        log_std: Log standard deviation (2,) of the actions, a tensor.
+        layers: Names of the layers, whose tensors are ``NAME.weight`` and
+            ``NAME.bias``.
+        scale: Centre and unit (D,) of the flat observation, tensors. Goals that follow
+            the observation are not scaled.
+        log_std: Logarithm of the standard deviation (2,) of the actions, a tensor.
         card: Card of the policy, see `NumpyPolicy`.
 
     Raises:
-        KeyError: There is no such layer.
+        KeyError: A layer does not exist.
     """
     pairs = [
         (_array(weights[f"{name}.weight"]), _array(weights[f"{name}.bias"]))

@@ -1,9 +1,9 @@
-"""Trust: code from a file runs only after a yes.
+"""Trust: code in a file runs only if the user allows it.
 
-Whoever unpickles a file runs what its author wrote into it. The zips of
-stable-baselines3 are such files; .npz and .onnx files hold numbers. The settings of a
-run may name Python files, which run without a question if the user has trained with
-exactly this code on this machine before.
+A pickled file can contain any code, which runs when the file is loaded. The zips of
+stable-baselines3 are pickled files. Files of the types .npz and .onnx contain numbers.
+The settings of a run can name Python files. They run without a question if the user has
+trained with exactly this code on this machine before.
 """
 
 from __future__ import annotations
@@ -16,38 +16,38 @@ from typing import ClassVar
 from marl_airhockey.sim.jit.folders import cache_folder
 
 TRUSTED_CODE = "trusted-code.txt"
-"""File in the cache folder with the SHA-256 of each Python file trained with."""
+"""File in the cache folder with the SHA-256 of each Python file used in training."""
 
 
 class Trust:
-    """Answer of this process to the question whether pickled code may run."""
+    """Permission to run pickled code, for this process."""
 
     answer: bool | None = None
-    """True: yes to all files; False: no to all; None: ask at a terminal, else no"""
+    """True for all files, False for none, None to ask at a terminal."""
     granted: ClassVar[set[Path]] = set()
-    """Files that got a yes at a terminal, so that there is one question for each"""
+    """Files that the user allowed at a terminal, so that each question occurs once."""
 
 
 def require_trust(
     path: Path, given: bool | None = None, code: str = "pickled Python"
 ) -> None:
-    """Ask, unless it is known, whether the code in a file may run.
+    """Ask for permission to run the code in a file, unless it is known.
 
     Args:
         path: Path of the file.
-        given: Answer for this file, if it is known.
-        code: Description of the code.
+        given: Permission for this file; None if it is not known.
+        code: Description of the code, for messages.
 
     Raises:
-        ValueError: The answer is no; nothing in the file has run.
+        ValueError: There is no permission. No code in the file has run.
     """
     answer = Trust.answer if given is None else given
     if answer is None and path in Trust.granted:
         return
     if answer is None and sys.stdin.isatty() and sys.stderr.isatty():
         print(
-            f"{path} holds {code}, which runs when it is loaded. Do you trust "
-            "where it comes from? [y/N] ",
+            f"{path} contains {code}, which runs when it is loaded. Do you trust "
+            "its source? [y/N] ",
             end="",
             file=sys.stderr,
             flush=True,
@@ -57,16 +57,16 @@ def require_trust(
             Trust.granted.add(path)
     if not answer:
         raise ValueError(
-            f"{path}: it holds {code}, which loading would run; say --trust, or from "
-            "Python load_policy(path, trust=True), if you trust where it comes from"
+            f"{path}: it contains {code}, which would run; if you trust its source, "
+            "use --trust, or load_policy(path, trust=True) in Python"
         )
 
 
 def trust_code(text: str) -> None:
-    """Remember the Python file that a text names as trusted, with what is in it now.
+    """Mark the Python file that a text names as trusted, with its current content.
 
     Args:
-        text: ``FILE.py`` or ``FILE.py:NAME``; anything else is left alone.
+        text: ``FILE.py`` or ``FILE.py:NAME``. Any other text has no effect.
     """
     digest = _digest(text)
     if digest and not is_trusted_code(text):
@@ -75,7 +75,7 @@ def trust_code(text: str) -> None:
 
 
 def is_trusted_code(text: str) -> bool:
-    """Return True if a text names a Python file that `trust_code` knows, unchanged."""
+    """Return True if a text names a Python file that was trusted and is unchanged."""
     digest, known = _digest(text), cache_folder() / TRUSTED_CODE
     return bool(digest) and known.exists() and digest in known.read_text().split()
 

@@ -1,1 +1,1 @@
-"""Rollouts: the loop over control steps, and the episodes that come of it."""
+"""Rollouts: the loop over control steps, and the resulting episodes."""

@@ -1,4 +1,4 @@
-"""Environment in which policies are measured: that of their training by default."""
+"""Environment in which policies are evaluated, by default that of their training."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.world.keywords import Keywords
 
 EVERYWHERE = ("profile", "control_dt", "goals")
-"""Keywords that hold for a policy in any scenario"""
+"""Keywords of a policy's training that apply in any scenario."""
 IN_ITS_SCENARIO = ("options", "physics")
-"""Keywords that hold for a policy in the scenario of its training alone"""
+"""Keywords of a policy's training that apply only in the same scenario."""
 
 
 def as_trained(
@@ -25,20 +25,20 @@ def as_trained(
     scenario: str | Scenario | None,
     keywords: Keywords,
 ) -> tuple[str | Scenario, Keywords]:
-    """Fill in what is not given with the environment that policies were trained in.
+    """Complete keywords with those of the environment in which policies were trained.
 
     Args:
-        players: Drivers by name; those that are no policies say nothing.
-        scenario: Scenario that is given, or None.
-        keywords: Keywords that are given; they are never changed. Options, drivers
-            and physics are merged by name.
+        players: Drivers by name. Drivers that are not policies add no keywords.
+        scenario: Requested scenario, or None.
+        keywords: Requested keywords, which have priority. Options, drivers and physics
+            are merged by name.
 
     Returns:
-        The scenario and the keywords to play with. With a single player, the drivers
-        of other seats are those of its training, too.
+        Scenario and keywords of the environment. With a single player, the drivers of
+        other seats are also those of its training.
 
     Raises:
-        ValueError: Nothing says what to play, the policies were trained in different
+        ValueError: The scenario is unknown, the policies were trained in different
             environments, or one names Python code that is not trusted.
     """
     known = {
@@ -47,7 +47,7 @@ def as_trained(
     if scenario is None:
         scenario = _agreed("scenario", known)
         if scenario is None:
-            raise ValueError("scenario: say what the driver is to play")
+            raise ValueError("scenario: none is known; name the scenario to play")
         _require_trust(str(scenario), players)
     same = {n: t for n, t in known.items() if _is_scenario(t, scenario)}
     found = {name: _agreed(name, known) for name in EVERYWHERE}
@@ -68,7 +68,7 @@ def as_trained(
 
 
 def seen_in(player: Driver, keywords: Keywords) -> Driver:
-    """Return a policy that takes the observations that keywords ask for, if they do."""
+    """Return a policy with the observation type of the keywords, if they have one."""
     observe = keywords.get("observe")
     if observe and isinstance(player, Policy):
         return replace(player, observe=observe)
@@ -80,7 +80,7 @@ def describe_environment(
     keywords: Keywords,
     players: Mapping[str, Driver],
 ) -> str:
-    """Return one line that names a scenario and the environment of its play."""
+    """Return one line that names a scenario and describes its environment."""
     forms = {p.observe for p in players.values() if isinstance(p, Policy)} - {None}
     observe = keywords.get("observe") or "/".join(sorted(map(str, forms)))
     named = scenario if isinstance(scenario, str) else find_scenario(scenario).name
@@ -104,23 +104,23 @@ def _agreed(name: str, known: Mapping[str, Mapping[str, Any]]) -> Any:
     """Return the value of all policies that have one; None if none has.
 
     Raises:
-        ValueError: different values.
+        ValueError: The values are different.
     """
     found = {player: facts[name] for player, facts in known.items() if name in facts}
     values = list(found.values())
     if any(value != values[0] for value in values):
         listed = ", ".join(f"{player}: {value}" for player, value in found.items())
         raise ValueError(
-            f"{name}: the policies were trained in different ones ({listed}); say "
-            f"which to take"
+            f"{name}: the policies were trained with different values ({listed}); "
+            f"choose one"
         )
     return values[0] if values else None
 
 
 def _is_scenario(facts: Mapping[str, Any], scenario: object) -> bool:
-    """Return True if a policy was trained in the scenario of a name, or may have been.
+    """Return True if a policy was, or may have been, trained in a named scenario.
 
-    Objects of scenarios have their options already.
+    It is False for scenario objects, because they have their options already.
     """
     if not isinstance(scenario, str):
         return False
@@ -129,21 +129,24 @@ def _is_scenario(facts: Mapping[str, Any], scenario: object) -> bool:
 
 
 def _resolved(text: str) -> str:
-    """Return code as training keeps it, with the absolute path of its file."""
+    """Return code as training stores it, with the absolute path of its file."""
     place, colon, name = text.partition(":")
     return f"{Path(place).expanduser().resolve()}{colon}{name}"
 
 
 def _require_trust(text: str, players: Mapping[str, Driver]) -> None:
-    """Refuse code that a policy's file names, unless the user has trained with it."""
+    """Check that the user has trained with the code that a policy's file names."""
     if not runs_code(text) or is_trusted_code(text):
         return
     file, source = Path(text.partition(":")[0]), next(iter(players))
     if file.suffix == ".py" and not file.exists():
         raise ValueError(
-            f"{source}: it was trained in {text}, and there is no such file"
+            f"{source}: it was trained in {text}, but this file does not exist"
         )
-    unknown = f"the name of Python code that you have not trained with as it is, {text}"
+    unknown = (
+        f"the name of Python code that you have not trained with in its current state, "
+        f"{text}"
+    )
     require_trust(Path(source), code=unknown)
 
 
@@ -153,19 +156,21 @@ def seated_players(
     keywords: Keywords,
     exact: bool,
 ) -> tuple[dict[str, Driver], Keywords]:
-    """Return the drivers of players, by name, and the keywords of their environment.
+    """Return drivers by name, and the keywords of their environment.
 
     Args:
-        players: Players by name, see `registry.make_driver`; or their names alone.
+        players: Players by name, see `registry.make_driver`, or a list of names.
         scenario: Scenario that they play.
-        keywords: Keywords that are given.
-        exact: Whether the others have their defaults, instead of those of training.
+        keywords: Requested keywords.
+        exact: True for the default values of all other keywords, False for those of
+            training.
 
     Raises:
-        ValueError: A single name instead of several, or trainings that do not agree.
+        ValueError: ``players`` is a single name, or the policies were trained in
+            different environments.
     """
     if isinstance(players, str):
-        raise ValueError(f"players: a list of names is expected, got {players!r}")
+        raise ValueError(f"players: expected a list of names, got {players!r}")
     named = players if isinstance(players, Mapping) else {n: n for n in players}
     drivers = {name: make_driver(player) for name, player in named.items()}
     if exact:

@@ -1,4 +1,4 @@
-"""Collector: the columns of a batch of episodes, as episodes."""
+"""Collector of the columns of a batch of episodes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from marl_airhockey.types import Array
 
 
 class Collector:
-    """Collector of the columns of B episodes that are played side by side.
+    """Collector of the columns of B episodes that are played in parallel.
 
     Args:
         world: Worlds whose episodes have begun.
@@ -24,11 +24,11 @@ class Collector:
         self._world, self._names = world, names
         self._notes = [episode_notes(world, i) for i in range(world.num_worlds)]
         self.first = first_columns(world, names)
-        """Columns (B, ...) before the first step"""
+        """Columns (B, ...) before the first step."""
         self._rows: list[Columns] = []
 
     def add(self) -> None:
-        """Collect the columns of the step that was made last."""
+        """Collect the columns of the last step."""
         self._rows.append(step_columns(self._world, self._names))
 
     @property
@@ -43,8 +43,8 @@ class Collector:
         """Yield the first n episodes, as views of the collected arrays.
 
         Args:
-            lengths: (n,) number of steps of each episode.
-            reasons: Reason of the end of each.
+            lengths: Number of steps of each episode (n,).
+            reasons: Reason of the end of each episode.
             first_index: Index of the first episode.
         """
         steps = self.steps

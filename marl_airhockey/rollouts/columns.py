@@ -1,4 +1,4 @@
-"""Columns of a recording: what is kept of worlds, and states made of it again."""
+"""Columns of a recording: conversion of worlds to columns and back to states."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from marl_airhockey.types import Memory
 
 STATE, SENSED, MEMORY, TERM = "state.", "sensed.", "memory.", "term."
 JUDGED = "judged."
-"""Beginnings of the names of columns"""
+"""Prefixes of the names of columns."""
 SHARED = ("seats", "goals")
-"""Keywords of environments that are options of all scenarios"""
+"""Keywords of environments that are options of all scenarios."""
 PATH = "path"
-"""Field of the states of scenes that need it"""
+"""Name of the path within a step, which the states of some scenes contain."""
 SEEN = ("position", "velocity", "visible")
-"""Fields of the sensed state that are kept"""
+"""Fields of the sensed state that are stored."""
 
 
 def head_of(world: World, keywords: Keywords) -> dict[str, Any]:
-    """Return what holds for all episodes of a recording of a world."""
+    """Return the metadata that all episodes of a recording of a world share."""
     return {
         "began": datetime.datetime.now(datetime.UTC).isoformat(),
         "scenario": world.scenario.name,
@@ -56,13 +56,13 @@ def head_of(world: World, keywords: Keywords) -> dict[str, Any]:
 
 
 def _physics(keywords: Keywords) -> Any:
-    """Return the physics that keywords name, whole: a file may change."""
+    """Return the physics of keywords, with the content of a file."""
     given = keywords.get("physics")
     return load_physics(given) if isinstance(given, (str, Path)) else given
 
 
 def _rig(keywords: Keywords) -> dict[str, Any]:
-    """Return the rig of a real table, whole: its file may be another one tomorrow."""
+    """Return the content of the rig file of a real table."""
     path = keywords.get("rig")
     return {"rig": json.loads(Path(path).read_text())} if path else {}
 
@@ -72,33 +72,33 @@ class EpisodeNotes(NamedTuple):
 
     seed: int
     number: int
-    """Number of the episode since the world had that seed"""
+    """Number of the episode since the seed was set."""
     physics: dict[str, float]
 
 
 def episode_notes(world: World, row: int = 0) -> EpisodeNotes:
-    """Return what holds for the running episode of a world."""
+    """Return seed and physics of the running episode of a world."""
     episode = world.episode
     physics = {k: float(v[row]) for k, v in episode.physics.items()}
     return EpisodeNotes(int(world.seeds[row]), int(episode.number[row]), physics)
 
 
 def first_columns(world: World, names: Collection[str] | None = None) -> Columns:
-    """Return the columns (B, ...) of what is there now: state, memory, observation.
+    """Return the current state, memory and observation as columns (B, ...).
 
     Args:
         world: Worlds whose episodes have begun.
-        names: Names of the columns that are wanted; None for all.
+        names: Names of the requested columns; None for all.
     """
     return _columns(BEFORE, world, names)
 
 
 def step_columns(world: World, names: Collection[str] | None = None) -> Columns:
-    """Return the columns (B, ...) of the step that was made last.
+    """Return the columns (B, ...) of the last step.
 
     Args:
         world: Worlds that have made a step.
-        names: Names of the columns that are wanted; None for all.
+        names: Names of the requested columns; None for all.
     """
     return _columns(BEFORE, world, names) | _columns(AFTER, world, names)
 
@@ -108,7 +108,7 @@ def _columns(
     world: World,
     names: Collection[str] | None,
 ) -> Columns:
-    """Return the columns of sources; what is not wanted is not computed either."""
+    """Return the requested columns of sources; others are not computed."""
     found: Columns = {}
     for beginnings, source in sources.items():
         if names is None or any(n.startswith(tuple(beginnings.split())) for n in names):
@@ -151,7 +151,7 @@ def _terms(world: World) -> Columns:
 
 
 def _judged(world: World) -> Columns:
-    """Return the states that the rules judged, in games that serve after it."""
+    """Return the states that the rules evaluated, in games that serve afterwards."""
     if not world.serves:
         return {}
     judged = world.judged
@@ -159,7 +159,7 @@ def _judged(world: World) -> Columns:
 
 
 def _devices(world: World) -> Columns:
-    """Return the numbers that devices of a real table report, (1, ...) each."""
+    """Return the numbers (1, ...) that the devices of a real table report."""
     if world.live is None:
         return {}
     numbers = world.live.telemetry()
@@ -176,8 +176,8 @@ BEFORE: Mapping[str, Callable[[World], Columns]] = {
     MEMORY: _memories,
     "observation": _observations,
 }
-"""Sources of the columns that exist before the first step, too, by the beginnings of
-their names"""
+"""Sources of the columns that also exist before the first step, by the prefixes of
+their names."""
 AFTER: Mapping[str, Callable[[World], Columns]] = {
     "action": lambda world: {"action": world.requested},
     "delayed_action": lambda world: {"delayed_action": world.action},
@@ -189,14 +189,14 @@ AFTER: Mapping[str, Callable[[World], Columns]] = {
     JUDGED: _judged,
     "device.": _devices,
 }
-"""Sources of the columns of a step"""
+"""Sources of the columns that exist only for steps, by the prefixes of their names."""
 
 
 def scenario_of(recording: Recording) -> Scenario:
     """Return the scenario that was recorded.
 
     Raises:
-        ValueError: one that is not installed here, or with other bodies.
+        ValueError: It is not installed, or has other bodies.
     """
     head = recording.head
     try:
@@ -210,7 +210,7 @@ def scenario_of(recording: Recording) -> Scenario:
     for episode in recording.episodes:
         if STATE + "position" not in episode.first:
             raise ValueError(
-                f"{recording.path}: there are no states in it, as in datasets of others"
+                f"{recording.path}: it contains no states, like datasets of others"
             )
         found = episode.first[STATE + "position"]
         if found.shape != (bodies, 2):
@@ -222,10 +222,10 @@ def scenario_of(recording: Recording) -> Scenario:
 
 
 def states_of(episode: Episode, scenario: Scenario) -> State:
-    """Return the states (T + 1, ...) of an episode, that before the first step first.
+    """Return the states (T + 1, ...) of an episode, from before the first step on.
 
     Raises:
-        ValueError: a column that is missing or of another shape, named.
+        ValueError: A column is missing or has another shape. The message names it.
     """
     rows = len(episode) + 1
     still = scenario.scene.still_state(rows)
@@ -251,13 +251,13 @@ def _joined(episode: Episode, name: str) -> Any:
     """Return a column with its first value before it.
 
     Raises:
-        ValueError: it is missing.
+        ValueError: The column is missing.
     """
     if name not in episode.first:
-        raise ValueError(f"{name}: it is missing")
+        raise ValueError(f"{name}: the column is missing")
     first = episode.first[name][None]
     if not len(episode):
         return first
     if name not in episode.columns:
-        raise ValueError(f"{name}: it is missing")
+        raise ValueError(f"{name}: the column is missing")
     return np.concatenate([first, episode.columns[name]])

@@ -1,4 +1,4 @@
-"""Play: the loop over control steps until every episode of a batch is over."""
+"""Loop over control steps until every episode of a batch has ended."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from marl_airhockey.types import Array
 
 
 class Played(NamedTuple):
-    """Control step of B worlds that has been played."""
+    """Control step of B worlds."""
 
     result: StepResult
     live: Array
-    """(B,) bool: the step belongs to the episode, which had not ended before"""
+    """True if the episode had not ended before this step (B,)."""
     ended: Array
-    """(B,) bool: the episode ended with this step"""
+    """True if the episode ended with this step (B,)."""
 
 
 def play(
@@ -27,18 +27,18 @@ def play(
 ) -> Iterator[Played]:
     """Play the running episode of each of B worlds to its end.
 
-    Worlds whose episode is over move on with all others until the last one has ended.
+    All worlds are stepped until the last episode has ended.
 
     Args:
         world: Worlds that have been reset and do not restart (``autoreset=False``).
-        act: Function that fills in the actions (B, open, 2) of open seats in place;
-            they begin at 0. Without open seats there is nothing to fill in.
+        act: Function that writes the actions (B, open, 2) of open seats in place. They
+            are 0 at first. Without open seats it is not needed.
 
     Yields:
-        Each control step, as soon as it is made.
+        Each control step, immediately after it.
 
     Raises:
-        ValueError: A reward term is nan at the end of an episode; named.
+        ValueError: A reward term is nan at the end of an episode. The message names it.
     """
     actions = np.zeros((world.num_worlds, len(world.open), 2))
     live = np.ones(world.num_worlds, np.bool_)

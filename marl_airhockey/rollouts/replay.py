@@ -1,9 +1,9 @@
-"""Replay: recorded episodes as worlds, to compute again what a rule makes of them.
+"""Replay of recorded episodes with the rules of a scenario.
 
-The states are those of the recording; all that follows from them is computed by the
-same code as in play: memory, reward terms, ends, sensing, observations. So a recording
-of one task becomes data of another with the same bodies, and old rewards can be checked
-against the rules of today.
+The states are those of the recording. Memory, reward terms, ends, sensing and
+observations are computed again, by the same code as in a simulation. A recording of one
+task can therefore become data of another task with the same bodies. Recorded rewards
+can be compared with the current rules.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ from marl_airhockey.types import Array
 
 
 class ReplayBackend(Backend):
-    """Backend that returns recorded states, whatever is commanded.
+    """Backend that returns recorded states and ignores commands.
 
     Args:
         scene: Scene of the episodes.
-        control_dt: Time of a step, s.
-        states: Judged states (T, B, ...) after each step, of B episodes.
+        control_dt: Duration of a step, s.
+        states: Evaluated states (T, B, ...) after each step of B episodes.
     """
 
     timestep: ClassVar[float | None] = None
@@ -52,7 +52,7 @@ class ReplayBackend(Backend):
         self._states, self._due = states, 0
 
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
-        """Do nothing: the states are known."""
+        """Do nothing, because the states are recorded."""
 
     def stage(self, command: Command, before: State, after: State) -> Stage:
         return Stage(self._fill, (after,))
@@ -66,17 +66,17 @@ class ReplayBackend(Backend):
 
 
 class ArmReplayBackend(ReplayBackend):
-    """The same for recordings in which arms moved the paddles."""
+    """Replay backend for recordings in which arms moved the paddles."""
 
     instant_contacts: ClassVar[bool] = False
     tracks_commands: ClassVar[bool] = False
 
 
 class RecordedPhysics(Physics):
-    """Physics whose values are those of recorded episodes.
+    """Physics with the values of recorded episodes.
 
     Args:
-        like: Physics that they were sampled from.
+        like: Physics from which the values were sampled.
         values: Values (B,) by name.
     """
 
@@ -85,24 +85,24 @@ class RecordedPhysics(Physics):
         self._values = values
 
     def draw(self, rng: RandomStreams) -> dict[str, Array]:
-        """Return the recorded values; B worlds are to begin together."""
+        """Return the recorded values (B,) by name; all worlds must begin together."""
         return {name: value.copy() for name, value in self._values.items()}
 
 
 class Replay:
-    """Replay of B recorded episodes side by side.
+    """Replay of B recorded episodes in parallel.
 
-    With the recorded scenario, memory, rewards and observations become the recorded
-    ones. With another one, an episode begins with the recorded state; goals are sampled
-    with the recorded seed.
+    With the recorded scenario, memory, rewards and observations are equal to the
+    recorded ones. With another scenario, an episode begins with the recorded state, and
+    goals are sampled with the recorded seed.
 
     Args:
         recording: Recording with the episodes, which all have steps.
         scenario: Scenario whose rules are applied; None for the recorded one.
 
     Raises:
-        ValueError: Another scene than that of the recording, or something is missing
-            that the scenario needs; named.
+        ValueError: The scene differs from the recorded one, or the recording lacks data
+            that the scenario needs. The message names the reason.
     """
 
     def __init__(self, recording: Recording, scenario: Scenario | None = None) -> None:
@@ -113,7 +113,7 @@ class Replay:
         _check_scene(game, own)
         states = [states_of(episode, game) for episode in episodes]
         self.lengths = np.array([len(episode) for episode in episodes])
-        """(B,) number of steps of each episode"""
+        """Number of steps of each episode (B,)."""
         self._first = _stacked([state.map(lambda x: x[0]) for state in states], 0)
         judged = [
             judged_states(e, s, game) for e, s in zip(episodes, states, strict=True)
@@ -130,7 +130,7 @@ class Replay:
         form = str(head.get("observe", "velocity"))
         cycles = int(head["max_cycles"]) if self._same else None
         self.world = World(game, backend, {}, physics, (form,), cycles, autoreset=False)
-        """Worlds of the episodes, all seats open"""
+        """Worlds of the episodes, with all seats open."""
         self._seeds = [episode.seed or 0 for episode in episodes]
         self._numbers = np.array([episode.number for episode in episodes])
         self._reasons = [episode.reason for episode in episodes]
@@ -142,15 +142,15 @@ class Replay:
         world.begin(None if self._same else self._first, self._numbers)
 
     def step(self, t: int) -> StepResult:
-        """Make step t (from 0); episodes that have ended keep their last state."""
+        """Make step t, from 0. Episodes that have ended stay in their last state."""
         return self.world.step(self._actions[t])
 
     def episodes(self, names: Collection[str] | None = None) -> Iterator[Episode]:
         """Replay all episodes and yield each, as long as it was recorded.
 
         Args:
-            names: Names of the columns that are computed, as far as the worlds have
-                them; None for all.
+            names: Names of the computed columns, without those that the worlds lack;
+                None for all.
         """
         self.begin()
         collector = Collector(self.world, names)
@@ -161,12 +161,12 @@ class Replay:
 
 
 def judged_states(episode: Episode, states: State, scenario: Scenario) -> State:
-    """Return the states (T, ...) that the rules judged: those before serves.
+    """Return the states (T, ...) that the rules evaluated, before serves.
 
     Args:
         episode: Episode of T steps.
-        states: Its states (T + 1, ...).
-        scenario: Scenario that is applied to it.
+        states: States of the episode (T + 1, ...).
+        scenario: Scenario whose rules are applied.
 
     Raises:
         ValueError: The scenario needs the path of the puck within a step, and the
@@ -188,7 +188,7 @@ def judged_states(episode: Episode, states: State, scenario: Scenario) -> State:
 
 
 def _check_scene(game: Scenario, own: Scenario) -> None:
-    """Refuse a scenario that cannot be played on the recorded table."""
+    """Check that a scenario has the scene of the recorded scenario."""
     new, old = game.scene, own.scene
     for name in ("table", "seats", "goal_lines", "bodies"):
         if getattr(new, name) != getattr(old, name):
@@ -204,9 +204,9 @@ def _physics(
     game: Scenario,
     played: type[Backend],
 ) -> Physics:
-    """Return the physics of episodes, and the ranges that they were sampled from.
+    """Return the physics of episodes, and the ranges from which they were sampled.
 
-    Of a real table nothing is simulated again: its states are measured.
+    For a real table nothing is simulated, because its states are measured.
     """
     profile, given = str(head.get("profile", "ideal")), head.get("physics")
     arms, real = not played.tracks_commands, issubclass(played, LiveBackend)

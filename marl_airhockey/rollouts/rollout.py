@@ -1,4 +1,4 @@
-"""Rollout: episodes of a driver, one after the other, as arrays."""
+"""Rollout: episodes of a driver as arrays."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.sim.world.world import World
 
 AT_ONCE = 64
-"""Number of episodes that are played in one batch"""
+"""Largest number of episodes that are played in one batch."""
 
 
 def rollout(
@@ -33,31 +33,32 @@ def rollout(
     columns: Collection[str] | None = None,
     **keywords: Unpack[Keywords],
 ) -> Generator[Episode]:
-    """Let a driver play episodes at ``paddle_0`` and yield each of them.
+    """Play episodes with a driver at ``paddle_0`` and yield each of them.
 
-    What is not given is that of a policy's training, as in `evaluate`. An episode has
-    the columns of a recording, see docs/data.md: ``episode.first["state.position"]``,
-    (bodies, 2), is what there was before the first step, and
-    ``episode.columns["reward"]``, (T, seats), what came of each step.
+    Keywords that are not given are those of the policy's training, as in `evaluate`. An
+    episode has the columns of a recording, see docs/formats.md. For example,
+    ``episode.first["state.position"]`` (bodies, 2) is the value before the first step.
+    ``episode.columns["reward"]`` (T, seats) contains a value for each step.
 
     Args:
-        player: Driver, or what makes one, see `registry.make_driver`.
-        scenario: Scenario, see `registry.find_scenario`; None for that of training.
-        episodes: Number of episodes; episode i has the seed ``seed + i``.
+        player: Driver, or an argument of `registry.make_driver`.
+        scenario: Scenario, see `registry.find_scenario`; None for the scenario of the
+            training.
+        episodes: Number of episodes. Episode i has the seed ``seed + i``.
         seed: Seed of the first episode.
-        columns: Names of the columns that are kept; None for all.
-        **keywords: Keywords of the environment, drivers of other seats among them; see
-            `build_world`.
+        columns: Names of the stored columns; None for all.
+        **keywords: Shared keywords, see `make.parallel_env`. ``drivers`` are those of
+            the other seats.
 
     Raises:
-        ValueError: A seat without a driver, one that does not fit, an unknown column,
-            or a reward term that is nan; named.
+        ValueError: A seat has no driver, a driver does not fit, a column is unknown, or
+            a reward term is nan. The message names it.
     """
     episodes, seed = check_count("episodes", episodes), check_seed(seed)
     driver, keywords = make_driver(player), table_keywords(keywords)
     scenario, keywords = as_trained({"player": driver}, scenario, keywords)
     driver = seen_in(driver, keywords)
-    # On a real table episodes follow each other; elsewhere many are played at once.
+    # Many episodes are played in parallel, except on a real table.
     real = is_live(keywords.get("backend", DEFAULT_BACKEND))
     at_once = 1 if real else min(episodes, AT_ONCE)
     world = build_driven_world(driver, scenario, at_once, keywords)
@@ -84,13 +85,13 @@ def play_episodes(
     seed: int,
     columns: Collection[str] | None = None,
 ) -> Iterator[Episode]:
-    """Play episodes in B worlds, B at once, and yield each of them.
+    """Play episodes in batches of B worlds and yield each of them.
 
     Args:
         world: Worlds without open seats, which do not restart.
-        episodes: Number of episodes; episode i has the seed ``seed + i``.
+        episodes: Number of episodes. Episode i has the seed ``seed + i``.
         seed: Seed of the first episode.
-        columns: Names of the columns that are kept, as far as the world has them; None
+        columns: Names of the stored columns, without those that the world lacks; None
             for all.
     """
     b = world.num_worlds

@@ -1,4 +1,4 @@
-"""Episodes of a driver or of a recording, in a window or as a video."""
+"""Display of episodes in a window or as a video."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
 
 FINAL_HOLD = 0.7
-"""Time, s, for which a video rests on the last image of an episode"""
+"""Time for which a video shows the last image of an episode, s."""
 RATE = 30.0
-"""Largest number of images a second in the video of a recording"""
+"""Largest number of images per second in the video of a recording."""
 
 
 def show_episodes(
@@ -36,27 +36,27 @@ def show_episodes(
     """Play some episodes with ``driver`` at ``paddle_0`` and show them.
 
     Args:
-        scenario: Name of the scenario, or a scenario object.
-        driver: Driver that plays.
+        scenario: Name, code, class or object, see `registry.find_scenario`.
+        driver: Driver of ``paddle_0``.
         keywords: Keywords of the environment.
         seed: Seed of the first episode.
         episodes: Number of episodes.
-        video: .gif, .webp or .mp4 to write; None opens a window.
-        width: Width of the video, px; None for that of its kind of file.
-        seconds: Time after which an episode is cut, s.
-        viewpoint: "top", or one of the backend's viewpoints.
+        video: Path of the .gif, .webp or .mp4 file to write; None opens a window.
+        width: Width of the video, pixels; None for the default of the file type.
+        seconds: Time after which an episode is stopped, s.
+        viewpoint: Camera of images, "top" or a viewpoint of the backend.
 
     Returns:
         The images (H, W, 3) uint8 of the video; an empty list for a window.
 
     Raises:
-        RuntimeError: There is no screen for a window.
-        ValueError: A video with another ending.
+        RuntimeError: There is no display for a window.
+        ValueError: The video has another file type.
     """
     if video is None and not any(
         os.environ.get(k) for k in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
     ):
-        raise RuntimeError("there is no screen here: use --video FILE.gif or FILE.mp4")
+        raise RuntimeError("there is no display; use --video FILE.gif or FILE.mp4")
     if video is not None:
         check_ending(video)
     width = width or width_of(video or "")
@@ -87,11 +87,11 @@ def write_replay(replay: Replay, video: Path, width: int | None = None) -> None:
 
     Args:
         replay: Replay of one episode.
-        video: .gif, .webp or .mp4 to write.
-        width: Width of the images, px; None for that of the kind of file.
+        video: Path of the .gif, .webp or .mp4 file to write.
+        width: Width of the video, pixels; None for the default of the file type.
 
     Raises:
-        ValueError: A video with another ending.
+        ValueError: The video has another file type.
     """
     check_ending(video)
     world, width = replay.world, width or width_of(video)

@@ -1,1 +1,1 @@
-"""Other physics: success of policies there, and identification of its parameters."""
+"""Success of policies with other physics, and identification of physics parameters."""

@@ -1,9 +1,10 @@
-"""Fit of a table's laws, corrected by what it makes of twins.
+"""Fit of a table's physics parameters, corrected by the bias of the fit.
 
-The laws that a fit finds are given to twins of the tracks (`twin.track_twin`), and what
-the fit makes of these, against what they were made with, is taken off. An interval
-grows by that correction and by its scatter over the twins, that of a slope also by what
-a camera's calibration leaves open.
+The tracks are simulated with the parameters that a fit finds (`twin.track_twin`), and
+the simulated tracks are fitted again. The mean error of this second fit is subtracted.
+The interval of a parameter grows by this correction and by its spread over the
+simulations. The interval of a slope also grows by the uncertainty of a camera's
+calibration.
 """
 
 from __future__ import annotations
@@ -20,21 +21,22 @@ from marl_airhockey.system_id.twin import track_twin
 from marl_airhockey.types import Array
 
 TWINS = 3
-"""Number of twins of all tracks"""
+"""Number of simulations of all tracks."""
 WITHIN = 1.96
-"""Standard deviations in half of a 95 % interval"""
+"""Number of standard deviations in half of a 95 % interval."""
 CALIBRATION = 5e-4
 """Standard deviation of a camera's scale, as a share, and of its direction, rad: tags
-are laid to half a millimetre in a metre. No twin shows it, and it tilts a slope."""
+are placed to half a millimetre in a metre. A simulation does not contain this error,
+which tilts a slope."""
 
 
 def fit_corrected(tracks: Sequence[Track], table: Table, seed: int = 0) -> FittedTable:
-    """Fit the laws of a table to tracks of its puck, see `fit_table`.
+    """Fit the physics parameters of a table to tracks of its puck, see `fit_table`.
 
     Args:
-        tracks: of one puck each, of the same table.
-        table: that they are of.
-        seed: of the twins' noise and scatter.
+        tracks: Tracks of one puck each, on the same table.
+        table: Table of the tracks.
+        seed: Seed of the noise and of the contact noise in the simulations.
     """
     raw = fit_table(list(tracks), table)
     laws = {name: estimate.value for name, estimate in raw.found.items()}
@@ -50,7 +52,9 @@ def fit_corrected(tracks: Sequence[Track], table: Table, seed: int = 0) -> Fitte
     for name, estimate in raw.found.items():
         seen = [twin[name].value for twin in twins if name in twin]
         if len(seen) < 2:
-            missing[name] = "not identifiable: a table with what was found hides it"
+            missing[name] = (
+                "not identifiable: simulations with the fitted values hide it"
+            )
         else:
             found[name] = _corrected(estimate, np.array(seen) - estimate.value)
     for name in {"tilt", "cross_tilt"} & found.keys():
@@ -71,8 +75,8 @@ def _corrected(estimate: Estimate, off: Array) -> Estimate:
     """Return an estimate without its bias.
 
     Args:
-        estimate: as it was fitted.
-        off: (K,) by how much twins were found off what they were made with.
+        estimate: Estimate of the fit.
+        off: Errors (K,) of the fits of simulated tracks.
     """
     bias, spread = float(off.mean()), WITHIN * float(off.std())
     half = float(np.hypot(np.hypot((estimate.high - estimate.low) / 2, spread), bias))
@@ -81,13 +85,13 @@ def _corrected(estimate: Estimate, off: Array) -> Estimate:
 
 
 def _widened(estimate: Estimate, deviation: float) -> Estimate:
-    """Return an estimate whose interval has another standard deviation in it."""
+    """Return an estimate whose interval includes another standard deviation."""
     half = np.hypot((estimate.high - estimate.low) / 2, WITHIN * deviation)
     low, high = estimate.value - float(half), estimate.value + float(half)
     return replace(estimate, low=low, high=high)
 
 
 def _noise(track: Track) -> float:
-    """Return the standard deviation of a place, m, by third differences."""
+    """Return the standard deviation of a position, m, by third differences."""
     off = np.abs(np.diff(track.puck, 3, axis=0))
     return float(np.median(off) / 0.6745 / np.sqrt(20.0))

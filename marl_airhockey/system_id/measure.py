@@ -1,4 +1,4 @@
-"""Sim-to-sim transfer: success of policies in physics they were not trained in."""
+"""Sim-to-sim transfer: success of policies with physics they were not trained with."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ def measure_transfer(
     keywords: Keywords | None = None,
     report: Callable[[], None] = lambda: None,
 ) -> list[EvaluationResult]:
-    """Evaluate policies in all backends and profiles, on the same episodes' seeds.
+    """Evaluate policies in all backends and profiles, with the same seeds of episodes.
 
     Args:
-        policies: drivers, by the name to report.
-        scenario: name of the scenario.
-        backends: names of backends.
-        profiles: names of profiles.
-        episodes: episodes of each combination.
-        keywords: keywords of the environments; backend and profile are replaced.
-        report: called after each combination.
+        policies: Drivers, by the name to report.
+        scenario: Name of the scenario.
+        backends: Names of backends.
+        profiles: Names of profiles.
+        episodes: Number of episodes of each combination.
+        keywords: Keywords of the environments; backend and profile are replaced.
+        report: Function that is called after each combination.
     """
     rows = []
     for name, driver in policies.items():
@@ -73,11 +73,11 @@ def fine_tuning_config(run: Path, steps: int) -> PPOConfig:
     """Return the configuration that trains a run's policy further on robosuite.
 
     Args:
-        run: folder of the run.
-        steps: steps of single worlds.
+        run: Folder of the run.
+        steps: Number of steps, summed over all worlds.
 
     Raises:
-        ValueError: no run, or one of an older version.
+        ValueError: There is no run, or it is of an older version.
     """
     config = load_config(PPOConfig, run / "config.toml")
     return dataclasses.replace(config, **TUNING, init=str(run), total_steps=steps)
@@ -89,7 +89,7 @@ def pretraining_config(scenario: str, profile: str, seed: int) -> PPOConfig:
 
 
 def plot_transfer(rows: Sequence[EvaluationResult], path: Path) -> None:
-    """Draw success by policy: a panel for each profile, a colour for each backend."""
+    """Plot success by policy: a panel for each profile, a colour for each backend."""
     import matplotlib.pyplot as plt
 
     from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy

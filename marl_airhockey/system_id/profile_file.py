@@ -1,4 +1,4 @@
-"""Profile of one table: laws that were fitted and delays that were measured."""
+"""Profile of one table from fitted physics parameters and measured delays."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from marl_airhockey.sim.core.servo import HALF
 from marl_airhockey.system_id.table_fit import FittedTable
 
 SERVO_SPREAD = 0.1
-"""Half-width of the range of a servo's lag, as a share: its delay is that of one
-motion, and strokes are faster"""
+"""Half-width of the range of a servo's lag, as a share; its delay is measured with one
+motion, and strokes are faster."""
 
 
 def profile_ranges(
     found: FittedTable, base: str, delays: Mapping[str, Any] | None
 ) -> dict[str, Range]:
-    """Return the ranges of a profile by parameter: intervals of what was found.
+    """Return the ranges of a profile by parameter: intervals of the fitted values.
 
     Args:
-        found: laws of the table.
-        base: name of the profile that has the rest.
-        delays: see `read_delays`; None for none.
+        found: Fitted parameters of the table.
+        base: Name of the profile with the other ranges.
+        delays: Measured delays, see `read_delays`; None without any.
 
     Raises:
-        ValueError: delays that lack something.
+        ValueError: A value of the delays is missing or wrong.
     """
     ranges: dict[str, Range] = {"puck_damping": (0.0, 0.0)}
     for name, estimate in found.found.items():
         bounds = PARAMETERS[name]
         ranges[name] = max(estimate.low, bounds.low), min(estimate.high, bounds.high)
     if {"tilt", "cross_tilt"} <= found.found.keys():
-        # A slope in any direction stood for what is known now.
+        # The measured slope replaces the slope in any direction.
         ranges["slope"] = (0.0, 0.0)
     if delays is not None:
         try:
@@ -46,10 +46,10 @@ def profile_ranges(
 
 
 def _measured(base: str, delays: Mapping[str, Any]) -> dict[str, Range]:
-    """Return the ranges that delays tell.
+    """Return the ranges of measured delays.
 
     Raises:
-        KeyError, TypeError, ValueError: they lack something.
+        KeyError, TypeError, ValueError: A value is missing or wrong.
     """
     ranges = {}
     if "camera" in delays:
@@ -60,7 +60,8 @@ def _measured(base: str, delays: Mapping[str, Any]) -> dict[str, Range]:
         }
     elif "arm" in delays:
         dead = sum(PROFILES[base].ranges.get("action_delay", (0.0, 0.0))) / 2
-        # A critically damped lag of frequency w is 2 / w late, half done at `HALF` / w.
+        # A critically damped lag of frequency w has the delay 2 / w, and makes half of
+        # a step in the time `HALF` / w.
         half = 0.5 * HALF * max(float(delays["arm"]["mean"]) - dead, 0.0)
         spread = SERVO_SPREAD * half
         ranges["servo_time"] = half - spread, half + spread
@@ -74,7 +75,7 @@ def _extent(row: Mapping[str, Any]) -> Range:
 def profile_toml(
     found: FittedTable, base: str, delays: Mapping[str, Any] | None, what: str
 ) -> str:
-    """Return the TOML of a profile of some `profile_ranges`, see `load_profile`."""
+    """Return the TOML text of a profile with `profile_ranges`, see `load_profile`."""
     ranges = profile_ranges(found, base, delays)
     lines = [f"what = {json.dumps(what)}", f"base = {json.dumps(base)}", "", "[ranges]"]
     lines += [f"{k} = [{low:.6g}, {high:.6g}]" for k, (low, high) in ranges.items()]
@@ -83,14 +84,14 @@ def profile_toml(
 
 
 def read_delays(paths: Iterable[Path]) -> dict[str, Any]:
-    """Read what ``calibrate delay --json`` and ``calibrate arm --json`` have printed.
+    """Read the output of ``calibrate delay --json`` and ``calibrate arm --json``.
 
     Returns:
-        All of it in one: ``camera`` and ``arm`` are delays of the one, ``action_delay``
-        and ``servo_time`` parameters of the other.
+        All values in one dictionary. ``camera`` and ``arm`` are delays of the first
+        command, ``action_delay`` and ``servo_time`` are parameters of the second.
 
     Raises:
-        ValueError: no such file, or something else.
+        ValueError: A file does not exist, or has other content.
     """
     found: dict[str, Any] = {}
     for path in paths:
@@ -102,7 +103,8 @@ def read_delays(paths: Iterable[Path]) -> dict[str, Any]:
             isinstance(given, dict) and ("camera" in given or "servo_time" in given)
         ):
             raise ValueError(
-                f"--delays {path}: not what calibrate delay or calibrate arm prints"
+                f"--delays {path}: not the output of calibrate delay --json or "
+                "calibrate arm --json"
             )
         found |= given
     return found

@@ -1,6 +1,6 @@
-"""Play as arrays of states and commands, from a world or from recordings.
+"""Arrays of states and commands, from a world or from recordings.
 
-Data for the fit in `transfer.system_id`.
+`system_id.system_id` fits physics parameters to them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from marl_airhockey.types import Array
 
 JUMP_SLACK = 0.5
 """Excess of a body's mean speed in a step over its speeds before and after it, m/s,
-above which it has not moved by physics: it was served or put by hand."""
+above which the physics has not moved it: it was served or placed by hand."""
 
 
 @dataclass(frozen=True)
@@ -33,18 +33,18 @@ class RecordedPlay:
     scene: Scene
     control_dt: float
     position: Array
-    """(T, N, 2) m, after each step"""
+    """Positions (T, N, 2) after each step, m."""
     velocity: Array
-    """(T, N, 2) m/s, after each step"""
+    """Velocities (T, N, 2) after each step, m/s."""
     command: Array
-    """(T, seats, 2) m/s, of the step that led there"""
+    """Commands (T, seats, 2) of the step that led to the state, m/s."""
     follows: Array
-    """(T,) bool, True where a row is one step after the row before"""
+    """True where a row is one step after the previous row, bool (T,)."""
 
     def segment_starts(self, steps: int) -> Array:
-        """Return (W,) rows that at least ``steps`` rows follow; none overlap.
+        """Return the first rows (W,) of segments of ``steps`` steps without overlap.
 
-        A row in which a body has jumped, say a served puck, follows no other.
+        A row in which a body has jumped, such as a served puck, follows no other.
         """
         moved = np.diff(self.position, axis=0, prepend=self.position[:1])
         distance = np.hypot(moved[..., 0], moved[..., 1])
@@ -66,11 +66,11 @@ COLUMNS = ("state.position", "state.velocity", "command")
 def record_play(
     scenario: str, driver: Driver, steps: int, seed: int, keywords: Keywords
 ) -> RecordedPlay:
-    """Let a driver play ``steps`` control steps in one world and record them.
+    """Record ``steps`` control steps of a driver in one world.
 
     Args:
         scenario: Name of the scenario.
-        driver: Driver at ``paddle_0`` and at the seats of its team.
+        driver: Driver of ``paddle_0`` and of the seats of its team.
         steps: Number of control steps.
         seed: Seed of the first episode.
         keywords: Keywords of the environment.
@@ -90,7 +90,7 @@ def load_recordings(paths: Sequence[Path]) -> RecordedPlay:
     """Read recordings.
 
     Raises:
-        ValueError: No recordings, or recordings of several scenarios.
+        ValueError: There are no recordings, or they are of several scenarios.
     """
     recordings = [read_recording(path) for path in paths]
     names = {recording.head["scenario"] for recording in recordings}
@@ -106,7 +106,7 @@ def load_recordings(paths: Sequence[Path]) -> RecordedPlay:
 
 
 def _joined(scene: Scene, dt: float, episodes: Sequence[Columns]) -> RecordedPlay:
-    """Return episodes one after the other."""
+    """Return the episodes as one array of rows."""
     position, velocity, command = (
         np.concatenate([episode[name] for episode in episodes]) for name in COLUMNS
     )

@@ -1,8 +1,8 @@
 """Identification of the 2D table's physics from play in 3D or on a real table.
 
 Short segments of recorded play are simulated again on the 2D table (backend "numba")
-from the same states with the same commands. The parameters found are those with which
-pucks and paddles end nearest to where they were recorded.
+from the same states with the same commands. The fit finds the parameters with which
+pucks and paddles end nearest to their recorded positions.
 """
 
 from __future__ import annotations
@@ -24,11 +24,12 @@ SEARCH_RANGE = ((-3.0, 3.0), (-0.15, 1.0), (-0.4, 0.1), (-0.4, 0.15))
 """Lowest and highest change of each of `FITTED` from its usual value."""
 LIMITS = np.array([(PARAMETERS[n].low, PARAMETERS[n].high) for n in FITTED])
 SEGMENT_SECONDS = 0.25
-"""Length of a segment, s."""
+"""Duration of a segment, s."""
 MAX_ERROR = 0.1
-"""Largest error of a puck that counts, m: after an odd bounce it may be anywhere."""
+"""Largest value that a puck's error counts with, m; after an irregular bounce the puck
+may be anywhere."""
 MIN_SEGMENTS = 50
-"""Fewest segments from which parameters are fitted."""
+"""Least number of segments from which parameters are fitted."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +37,11 @@ class FittedPhysics:
     """Fitted parameters, and the error of the 2D table before and after the fit."""
 
     physics: dict[str, float]
-    """`FITTED` and action_delay (s), by name"""
+    """Values of `FITTED` and of action_delay, s, by name."""
     before: tuple[float, float]
-    """Mean error of pucks and of paddles after a segment with the usual values, m"""
+    """Mean error of pucks and of paddles after a segment with the usual values, m."""
     after: tuple[float, float]
-    """Mean error of pucks and of paddles after a segment with the fitted values, m"""
+    """Mean error of pucks and of paddles after a segment with the fitted values, m."""
     segments: int
 
     @property
@@ -49,25 +50,29 @@ class FittedPhysics:
         return 1.0 - self.after[0] / self.before[0]
 
     def to_toml(self) -> str:
-        """Return a preset for ``--physics FILE``."""
+        """Return the text of a file for ``--physics FILE``."""
         lines = [
-            f"# {self.segments} segments of {SEGMENT_SECONDS} s; pucks off by "
-            f"{1000 * self.before[0]:.1f} mm before, {1000 * self.after[0]:.1f} mm now"
+            f"# {self.segments} segments of {SEGMENT_SECONDS} s; error of pucks "
+            f"{1000 * self.before[0]:.1f} mm before the fit, "
+            f"{1000 * self.after[0]:.1f} mm after it"
         ]
         lines += [f"{name} = {value:.5g}" for name, value in self.physics.items()]
         return "\n".join(lines) + "\n"
 
 
 def fit_physics(play: RecordedPlay) -> FittedPhysics:
-    """Find the physics of the 2D table that explain recorded play best.
+    """Find the physics parameters of the 2D table that fit recorded play best.
 
     Raises:
-        ValueError: too few segments, or a scene with blocks.
-        RuntimeError: scipy is missing, with the line that installs it.
+        ValueError: There are too few segments, or the scene has blocks.
+        RuntimeError: scipy is missing. The message contains the command to install it.
     """
     require("scipy", "robosuite")
     if play.scene.blocks:
-        raise ValueError("fit: blocks are not fitted; take another scenario")
+        raise ValueError(
+            "fit: the scenario has blocks, which are not fitted; choose another "
+            "scenario"
+        )
     model = _SegmentModel(play)
     usual = {n: p.default for n, p in PARAMETERS.items()} | play.scene.defaults
     first = np.array([*(usual[name] for name in FITTED), 0.0])
@@ -85,7 +90,7 @@ def fit_physics(play: RecordedPlay) -> FittedPhysics:
 def _fit_delay(model: _SegmentModel, usual: dict[str, float], first: Array) -> float:
     """Return the action delay, s, that explains the paddles' motion best.
 
-    Paddles alone show it; contacts that take time would look like a delay.
+    Only paddles are used, as contacts that take time would look like a delay.
     """
     from scipy.optimize import minimize_scalar
 
@@ -101,14 +106,14 @@ def _fit_delay(model: _SegmentModel, usual: dict[str, float], first: Array) -> f
 def _fit_parameters(
     model: _SegmentModel, usual: dict[str, float], first: Array, delay: float
 ) -> Array:
-    """Return the values of `FITTED`, and ``delay``, with the smallest pucks' error."""
+    """Return `FITTED` with the smallest error of pucks, and ``delay``."""
     from scipy.optimize import differential_evolution, minimize
 
     def loss(values: Array) -> float:
         pucks, _ = model.errors(usual, np.append(values, delay))
         return float(np.minimum(pucks, MAX_ERROR).mean())
 
-    # Bounces make the loss uneven: a descent alone gets stuck.
+    # Bounces give the loss many local minima, so a local search alone fails.
     low_high = np.clip(first[:-1] + np.array(SEARCH_RANGE).T, *LIMITS.T)
     bounds = list(zip(*low_high, strict=True))
     rough = differential_evolution(
@@ -119,13 +124,13 @@ def _fit_parameters(
 
 
 class _SegmentModel:
-    """Simulation of all segments at once, one world of the 2D table for each.
+    """Simulation of all segments in one batch, with one world of the 2D table for each.
 
     Args:
-        play: recorded play.
+        play: Recorded play.
 
     Raises:
-        ValueError: too few segments.
+        ValueError: There are too few segments.
     """
 
     def __init__(self, play: RecordedPlay) -> None:
@@ -133,22 +138,22 @@ class _SegmentModel:
         self._steps = max(round(SEGMENT_SECONDS / play.control_dt), 2)
         rows = play.segment_starts(self._steps)
         self.rows = rows[_free_pucks(play, rows)]
-        """(W,) first row of each segment"""
+        """First row of each segment (W,)."""
         if len(self.rows) < MIN_SEGMENTS:
             raise ValueError(
                 f"fit: {len(self.rows)} segments of {SEGMENT_SECONDS} s are too few; "
-                f"at least {MIN_SEGMENTS} are needed: play longer (--steps), or give "
-                "more recordings"
+                f"at least {MIN_SEGMENTS} are needed: record more steps (--steps), or "
+                "pass more recordings"
             )
         kind = find_backend("numba")
         self._backend = kind(play.scene, len(self.rows), play.control_dt)
 
     def errors(self, usual: dict[str, float], values: Array) -> tuple[Array, Array]:
-        """Return (W, pucks) and (W, seats) distances from the recorded end, m.
+        """Return the distances (W, pucks) and (W, seats) from the recorded end, m.
 
         Args:
-            usual: values of all parameters, by name.
-            values: (5,) values of `FITTED` and the action delay, s.
+            usual: Default values of all parameters, by name.
+            values: Values (5,) of `FITTED` and of the action delay, s.
         """
         play, count = self._play, len(self.rows)
         physics = {**usual, **dict(zip(FITTED, values, strict=False))}
@@ -179,7 +184,7 @@ class _SegmentModel:
 
 
 def _free_pucks(play: RecordedPlay, rows: Array) -> Array:
-    """Return (W,) bool, True where no puck touches anything at the start of a segment.
+    """Return True for segments (W,) in which no puck touches anything at the start.
 
     Contacts may take time where the play was recorded; on the 2D table they do not.
     """

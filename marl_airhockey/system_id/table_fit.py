@@ -1,9 +1,9 @@
-"""Laws of a real table from tracks of its puck, with intervals.
+"""Fit of the physics parameters of a real table to tracks of its puck, with intervals.
 
-Each law is read off where it shows: drag and slope in free flights, restitution in
-bounces, friction in shallow bounces, which slide unless the puck spins along. Intervals
-are 95 % of a bootstrap over flights and bounces. A parameter that the tracks do not
-determine is named with the reason, and not written.
+Drag and slope are fitted to free flights, restitution to bounces, and friction to
+shallow bounces, which slide unless the puck spins along. Intervals are 95 % intervals
+of a bootstrap over flights and bounces. A parameter that the tracks do not determine is
+omitted, and the reason is given.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from marl_airhockey.system_id.track import Contacts, Flights, Track, cut
 from marl_airhockey.types import Array
 
 LONGEST = 0.15
-"""Least length of a flight that shows drag and slope, s."""
+"""Least duration of a flight that is used for drag and slope, s."""
 FEWEST = 20
-"""Fewest flights or bounces from which a parameter is fitted."""
+"""Least number of flights or bounces from which a parameter is fitted."""
 RESAMPLES = 200
 WIDEST = {
     "puck_drag": 0.015,
@@ -33,10 +33,10 @@ WIDEST = {
     "wall_friction": 0.06,
     "paddle_restitution": 0.08,
 }
-"""Largest half of an interval of a parameter that counts as identified."""
+"""Largest half-width of the interval of a parameter that counts as identified."""
 SLIDES = 1.2
-"""Factor by which the tangential speed exceeds that at which a bounce without spin
-would stick, in bounces that count for friction."""
+"""Least ratio of the tangential speed to the one at which a bounce without spin would
+stick, for bounces that are used for friction."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Estimate:
     low: float
     high: float
     count: int
-    """Number of flights or bounces"""
+    """Number of flights or bounces."""
 
 
 @dataclass(frozen=True)
@@ -55,14 +55,14 @@ class FittedTable:
     """Fitted parameters of a table."""
 
     found: dict[str, Estimate]
-    """Estimates by name, those that are identified"""
+    """Estimates of the identified parameters, by name."""
     by_side: dict[int, Estimate]
-    """Restitution at 1 m/s by side of the table"""
+    """Restitution at 1 m/s, by side of the table."""
     missing: dict[str, str]
-    """Reasons why others are not identifiable, by name"""
+    """Reasons why other parameters are not identifiable, by name."""
 
     def to_toml(self) -> str:
-        """Return physics for ``--physics FILE``."""
+        """Return the text of a file for ``--physics FILE``."""
         lines = ["# value  # 95 % interval, number of flights or bounces"]
         lines.append("puck_damping = 0.0")
         for name, e in self.found.items():
@@ -79,7 +79,7 @@ class FittedTable:
 
 
 def fit_table(tracks: list[Track], table: Table) -> FittedTable:
-    """Fit the laws of a table to tracks of its puck."""
+    """Fit the physics parameters of a table to tracks of its puck."""
     cuts = [cut(track, table) for track in tracks]
     flights = Flights(*(np.concatenate(x) for x in _columns(f for f, _ in cuts)))
     contacts = Contacts(*(np.concatenate(x) for x in _columns(c for _, c in cuts)))
@@ -148,7 +148,7 @@ def fit_table(tracks: list[Track], table: Table) -> FittedTable:
 def _estimates(
     rng: np.random.Generator, rows: Array, law: Callable[[Array], Array]
 ) -> list[Estimate]:
-    """Return what a law makes of some rows, with intervals by a bootstrap over them."""
+    """Return the estimates of a fit to some rows, with intervals by a bootstrap."""
     best = law(rows)
     draws = np.array([law(rng.choice(rows, len(rows))) for _ in range(RESAMPLES)])
     low, high = np.quantile(draws, (0.025, 0.975), axis=0)
@@ -175,7 +175,7 @@ def _flight_law(flights: Flights, rows: Array) -> Array:
             np.stack([-speed[:, 0] * v[:, 1], none, one], 1),
         ]
     )
-    # The curvature of a flight is known as its length to the power of 2.5.
+    # The precision of the curvature grows as the duration to the power of 2.5.
     known = np.concatenate([t, t]) ** 2.5
     wanted, weight = a.T.ravel(), known
     for _ in range(5):
@@ -211,11 +211,12 @@ def _rubbing(contacts: Contacts) -> Array:
 
 def _sliding(contacts: Contacts, banks: Array, e: Array) -> Array:
     """Return the bounces so shallow that a puck without spin slides to their end."""
-    # From below: bounces that stick rub less, and drop out as the friction grows.
+    # Start with a low value: bounces that stick have less friction, and are excluded as
+    # the estimate grows.
     rows, friction = banks, 0.03
     for _ in range(30):
         before = contacts.before[banks]
-        # It sticks where a third of the slip is less than friction can take.
+        # A bounce sticks if a third of the slip is less than friction can stop.
         needed = 3.0 * friction * (1.0 + e[banks]) * before[:, 0]
         rows = banks[np.abs(before[:, 1]) > SLIDES * needed + 0.2]
         if len(rows) < FEWEST:

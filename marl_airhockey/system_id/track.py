@@ -1,4 +1,4 @@
-"""Tracks: recorded ways of a puck, cut into free flights and the contacts between."""
+"""Tracks: recorded trajectories of a puck, split into free flights and contacts."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
 SLOWEST_RATE = 50.0
-"""Lowest rate of a track, 1/s: flights between banks must last several rows."""
+"""Lowest rate of a track, 1/s; flights between wall bounces must last several rows."""
 WINDOW = 4
-"""Rows before and after a contact by which it is found."""
+"""Number of rows before and after a contact that are used to find it."""
 JUMP = 0.12
-"""Least change of velocity that is a contact, m/s, and its share of the speed."""
+"""Least change of velocity that is a contact, m/s; `JUMP_SHARE` is the least share of
+the speed."""
 JUMP_SHARE = 0.06
 SHORTEST = 6
-"""Fewest rows of a flight."""
+"""Least number of rows of a flight."""
 LOST = 0.08
-"""Longest time without a row within which a contact may be, s."""
+"""Longest time without a row in which a contact is assumed, s."""
 OFF = 0.1
-"""Largest distance of a puck from the table that a camera may report, m"""
+"""Largest distance of a puck from the table that a camera may report, m."""
 GAP = 0.02
-"""Largest distance of a puck from what it touches at a contact, m."""
+"""Largest distance of a puck from the touched body at a contact, m."""
 
 
 @dataclass(frozen=True)
@@ -34,65 +35,67 @@ class Track:
     """Track of a puck: rows of one recording, table frame."""
 
     time: Array
-    """s (N,)"""
+    """Times (N,), s."""
     puck: Array
-    """m (N, 2)"""
+    """Positions (N, 2) of the puck, m."""
     paddle: Array | None
-    """m (N, 2)"""
+    """Positions (N, 2) of the paddle, m; None if they were not recorded."""
 
 
 @dataclass(frozen=True)
 class Flights:
-    """Free flights, F of them."""
+    """F free flights."""
 
     seconds: Array
-    """Lengths (F,), s"""
+    """Durations (F,), s."""
     velocity: Array
-    """Mean velocities (F, 2), m/s"""
+    """Mean velocities (F, 2), m/s."""
     acceleration: Array
-    """Mean accelerations (F, 2), m/s2"""
+    """Mean accelerations (F, 2), m/s2."""
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Contacts between two flights, C of them, along and across their normals."""
+    """C contacts between two flights, along and across their normals."""
 
     side: Array
-    """Sides of the table (C,), -1 for hits of a paddle"""
+    """Sides of the table (C,), -1 for hits of a paddle."""
     before: Array
     """Normal speed toward the surface and tangential velocity before (C, 2), m/s,
-    relative to what is touched"""
+    relative to the touched body."""
     after: Array
-    """Normal speed away from it and tangential velocity after (C, 2), m/s"""
+    """Normal speed away from it and tangential velocity after (C, 2), m/s."""
 
 
 def read_track(path: Path, table: Table, origin: str = "centre") -> Track:
     """Return the track in a CSV file with the header t,x,y[,paddle_x,paddle_y].
 
     Args:
-        path: rows in s and m.
-        table: table of the rows.
-        origin: "centre" of the table, or "corner": the one with the least x and y.
+        path: Path of the file, with times in s and positions in m.
+        table: Table of the track.
+        origin: Origin of the positions: "centre" of the table, or "corner", the one
+            with the least x and y.
 
     Raises:
-        ValueError: a missing column, a row that is not of numbers, times that do not
-            grow, or too few rows a second, named.
+        ValueError: A column is missing, a row is not numeric, times do not increase,
+            there are too few rows per second, the puck is off the table, or the origin
+            is unknown.
     """
     if origin not in ("centre", "corner"):
-        raise ValueError(f"--origin: {origin!r} is neither centre nor corner")
+        raise ValueError(f"--origin: {origin!r}; expected centre or corner")
     values = read_rows(path)
     has_paddle = bool(np.isfinite(values[:, 3:]).any())
     values = values[np.isfinite(values[:, :3]).all(1)]
     steps = np.diff(values[:, 0])
     if len(values) < 2 * SHORTEST or (steps <= 0.0).any():
         raise ValueError(
-            f"{path}: {len(values)} rows whose times must grow, at least "
-            f"{2 * SHORTEST} are needed"
+            f"{path}: {len(values)} rows; expected at least {2 * SHORTEST}, with "
+            "increasing times"
         )
     if np.median(steps) > 1.0 / SLOWEST_RATE:
         raise ValueError(
-            f"{path}: {1 / np.median(steps):.0f} rows a second are too few, at least "
-            f"{SLOWEST_RATE:.0f} are needed: contacts could not be told apart"
+            f"{path}: {1 / np.median(steps):.0f} rows per second; expected at least "
+            f"{SLOWEST_RATE:.0f}, to separate contacts"
         )
     low = np.asarray(table.vertices).min(0) if origin == "corner" else np.zeros(2)
     puck, corners = values[:, 1:3] + low, np.asarray(table.vertices)
@@ -108,7 +111,7 @@ def read_track(path: Path, table: Table, origin: str = "centre") -> Track:
 
 
 def cut(track: Track, table: Table) -> tuple[Flights, Contacts]:
-    """Cut a track into flights, and describe the contacts between them."""
+    """Split a track into flights and the contacts between them."""
     steps = np.diff(track.time)
     breaks = np.flatnonzero(steps > LOST) + 1
     flights: list[tuple[float, Array, Array]] = []
@@ -162,7 +165,7 @@ def _pieces(track: Track, rows: Array) -> list[Array]:
     holes = np.flatnonzero(steps > 1.5 * np.median(steps)) + 1
     pieces = []
     for a, b in pairwise([0, *sorted({*cuts, *holes.tolist()}), len(rows)]):
-        # The rows beside a contact that was seen belong to neither flight.
+        # The rows next to a detected contact belong to neither flight.
         first = a + 2 if a in cuts else a
         pieces.append(rows[first : b - 1 if b in cuts else b])
     return [piece for piece in pieces if len(piece) >= SHORTEST]
@@ -184,12 +187,12 @@ class _Flight:
         self._line = np.polyfit(self.time - self._middle, track.puck[rows], 1)
 
     def summary(self) -> tuple[float, Array, Array]:
-        """Return length, mean velocity and mean acceleration."""
+        """Return duration, s, mean velocity and mean acceleration."""
         length = float(self.time[-1] - self.time[0])
         return length, self._parabola[1], 2.0 * self._parabola[0]
 
     def at(self, time: float) -> tuple[Array, Array]:
-        """Return place and velocity at a time; in a short flight it is constant."""
+        """Return position and velocity; in a short flight the velocity is constant."""
         since = time - self._middle
         if len(self.rows) < 3 * SHORTEST:
             return self._line[0] * since + self._line[1], self._line[0]
@@ -200,7 +203,7 @@ class _Flight:
 def _contact(
     track: Track, table: Table, one: _Flight, two: _Flight
 ) -> tuple[int, Array, Array] | None:
-    """Return side and velocities of the contact between two flights, None for none."""
+    """Return side and velocities of the contact of two flights; None without one."""
     time = 0.5 * float(one.time[-1] + two.time[0])
     (place, before), (_, after) = one.at(time), two.at(time)
     depth = table.normals @ place + table.offsets - table.puck_radius
@@ -222,7 +225,7 @@ def _contact(
 
 
 def _split(normal: Array, before: Array, after: Array) -> tuple[Array, Array]:
-    """Return normal speed toward and tangential velocity before, and away after."""
+    """Return normal speed and tangential velocity (2,), before and after."""
     tangent = np.array([-normal[1], normal[0]])
     return (
         np.array([-normal @ before, tangent @ before]),

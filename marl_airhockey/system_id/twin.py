@@ -1,7 +1,8 @@
-"""Twin: a track as it would be on a table whose laws are known.
+"""Simulation of a track on a table with known physics parameters.
 
-What a fit makes of a twin, against what the twin was made with, is the fit's own error:
-a parabola for a flight, a straight line into a bounce, noise in both.
+The difference between the parameters that a fit finds in a simulated track and the
+known ones is the error of the fit. The fit approximates a flight by a parabola and the
+path into a bounce by a straight line, and both contain noise.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from marl_airhockey.system_id.track import LOST, SHORTEST, Track
 from marl_airhockey.types import Array
 
 LONGEST = 3.0
-"""Time after which a twin begins anew from the track, s: it goes its own ways"""
+"""Time after which the simulation starts again from the track, s, as both diverge."""
 
 
 def track_twin(
@@ -30,17 +31,17 @@ def track_twin(
     noise: float,
     rng: np.random.Generator,
 ) -> Track:
-    """Return the track that a puck leaves where the laws are known.
+    """Simulate a track with known physics parameters.
 
-    It begins like pieces of a track, and paddles move as they did there.
+    The simulation starts at pieces of the recorded track, and paddles move as recorded.
 
     Args:
-        track: of a real table.
-        table: on which it was.
-        laws: values of parameters; others are in the middle of those of the tables that
-            were measured.
-        noise: standard deviation of a place, m.
-        rng: of the noise and of scatter.
+        track: Track on a real table.
+        table: Table of the track.
+        laws: Values of parameters, by name. Others are in the middle of the ranges that
+            were measured on real tables.
+        noise: Standard deviation of a position, m.
+        rng: Random generator of the noise and of the contact noise.
     """
     pieces = _pieces(track)
     period = float(np.median(np.diff(track.time)))
@@ -83,7 +84,7 @@ def _pieces(track: Track) -> list[Array]:
 
 
 def _start(track: Track, rows: Array) -> tuple[Array, Array]:
-    """Return place and velocity (2,) at the first row of a piece."""
+    """Return position and velocity (2,) at the first row of a piece."""
     first = rows[:SHORTEST]
     since = track.time[first] - track.time[first[0]]
     line = np.polyfit(since, track.puck[first], 1)
@@ -91,7 +92,7 @@ def _start(track: Track, rows: Array) -> tuple[Array, Array]:
 
 
 def _paddle(track: Track, rows: Array, length: int, period: float) -> Array:
-    """Return (length, 4) place and velocity of the paddle at each step of a piece."""
+    """Return position and velocity (length, 4) of the paddle in a piece."""
     if track.paddle is None:
         return np.full((length, 4), np.nan)
     times = track.time[rows[0]] + period * np.arange(1, length + 1)

@@ -1,4 +1,4 @@
-"""Toolkit: everything that scenario and agent files import."""
+"""Toolkit: the names that files of scenarios and drivers import."""
 
 from __future__ import annotations
 

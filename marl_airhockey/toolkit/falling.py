@@ -1,4 +1,4 @@
-"""Falling puck: the part that tasks with a puck falling towards one seat share."""
+"""Bases of tasks in which a puck falls towards one seat."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from marl_airhockey.types import Array, Memory
 class FallingPuck(Scenario):
     """Base of tasks in which a puck falls from the far half towards one seat.
 
-    The home side is a goal line. Memory ``gap`` (...) is the shortest distance of the
-    paddle to the puck up to the first touch, m; subclasses continue it with
+    The home side is a goal line. The memory contains ``gap`` (...), the shortest
+    distance between paddle and puck until the first touch, m. Subclasses update it with
     `rewards.nearest`.
     """
 
     PATH: ClassVar[bool] = False
-    """Whether states have the path of the puck within a step."""
+    """True if states contain the path of the puck within a step."""
 
     @cached_property
     def scene(self) -> Scene:
@@ -55,13 +55,13 @@ class FallingPuck(Scenario):
 class FewShots(FallingPuck):
     """Base of tasks in which one of the first shots must succeed.
 
-    With any number of shots, chance succeeds: a controller that does not see the goal
-    hits it sooner or later. The touch after the last shot ends the episode.
+    Without a limit chance succeeds: after enough shots, a controller that does not
+    observe the goal hits it. The touch after the last shot ends the episode.
     """
 
     shots: int = 2
-    """Number of distinct touches of which one must succeed."""
+    """Number of distinct touches within which the task must succeed."""
 
     def within_shots(self, memory: Memory) -> Array:
-        """(...) bool: there have been no more touches than shots."""
+        """Return True (...) if the number of distinct touches is at most `shots`."""
         return np.asarray(memory["touches"].sum((-1, -2)) <= self.shots)

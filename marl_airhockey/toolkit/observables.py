@@ -1,6 +1,6 @@
-"""Observables that scenarios share: the parts of a seat's observation.
+"""Observables: the parts of an observation that scenarios share.
 
-A scenario lists observables; spaces, labels and scales follow from their columns.
+A scenario lists observables. Spaces, labels and scales are derived from their columns.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class OwnPaddle(Observable):
-    """Position and velocity of the own paddle, and (then) when all else was seen.
+    """Position and velocity of the own paddle, m and m/s (delayed: with latency).
 
-    They are as its robot reports them; those of then are there with a reaction. In an
-    estimate or a history also the last actions, which may still be on their way.
+    The robot of the seat reports them. With a reaction time, the delayed values follow:
+    those at the time of all other observations. An estimate or a history also contains
+    the last actions, which may not have taken effect yet.
     """
 
     def columns(self, scope: ObservationContext) -> list[Element]:
@@ -59,7 +60,10 @@ class OwnPaddle(Observable):
 
 @dataclass(frozen=True)
 class OtherPaddles(Observable):
-    """Positions and velocities of the other paddles, teammates first, by ego angle."""
+    """Position and velocity of each other paddle, m and m/s, teammates first.
+
+    Teammates and opponents are sorted by the angle of their side, ego frame.
+    """
 
     def columns(self, scope: ObservationContext) -> list[Element]:
         columns = []
@@ -80,7 +84,7 @@ class OtherPaddles(Observable):
 
 
 def _others(scene: Scene) -> Array:
-    """(S, S - 1) indices of other seats: teammates, then opponents, by ego angle."""
+    """Return the indices (S, S - 1) of the other seats, teammates first."""
     angles = np.arctan2(*scene.table.normals.T[::-1])
     rows = []
     for me, seat in enumerate(scene.seats):
@@ -99,12 +103,12 @@ def _others(scene: Scene) -> Array:
 
 @dataclass(frozen=True)
 class Pucks(Observable):
-    """Position, velocity and spin of every puck, or its history.
+    """Position, velocity and spin of each puck, m and m/s (predicted: for now).
 
-    With a reaction time, position and velocity predicted for now by free flight follow,
-    see `extrapolation.extrapolate`. An estimate has visibility and age (s) of the
-    newest frame in addition. The spin is the speed of the edge, radius times angular
-    velocity, counter-clockwise.
+    The spin is the speed of the edge, radius times angular velocity, counter-clockwise.
+    With a reaction time, position and velocity for now follow, see
+    `extrapolation.extrapolate`. An estimate also contains visibility and age, s, of the
+    newest frame. A history contains position, visibility and age of several frames.
     """
 
     def columns(self, scope: ObservationContext) -> list[Element]:
@@ -150,7 +154,7 @@ class Pucks(Observable):
 
 
 def _frame_columns(name: str) -> list[Element]:
-    """Return the columns of what a camera says of a frame."""
+    """Return the columns of the visibility and the age of a frame."""
     return [
         Element(f"{name}.seen", 0.0, 1.0, 1.0),
         Element(f"{name}.age", 0.0, 1.0, 0.1),
@@ -159,7 +163,10 @@ def _frame_columns(name: str) -> list[Element]:
 
 @dataclass(frozen=True)
 class OwnToPucks(Observable):
-    """Vector from the seat's own paddle to every puck, with a reaction both as now."""
+    """Vector from the own paddle to each puck, m.
+
+    With a reaction time it is computed from the predicted position of the puck.
+    """
 
     def columns(self, scope: ObservationContext) -> list[Element]:
         names = [f"own_to_puck_{i}" for i in range(scope.scene.pucks)]
@@ -171,10 +178,10 @@ class OwnToPucks(Observable):
 
 @dataclass(frozen=True)
 class Blocks(Observable):
-    """Position of every block."""
+    """Position of each block, m."""
 
     x: float
-    """Typical x of blocks (m), the centre of the scaling."""
+    """Typical x of blocks, m, which is the centre of the scaling."""
 
     def columns(self, scope: ObservationContext) -> list[Element]:
         names = [f"block_{i}" for i in range(scope.scene.blocks)]
@@ -190,7 +197,7 @@ class Blocks(Observable):
 
 @dataclass(frozen=True)
 class PuckToBlocks(Observable):
-    """Vector from puck 0 to every block."""
+    """Vector from puck 0 to each block, m."""
 
     def columns(self, scope: ObservationContext) -> list[Element]:
         names = [f"puck_0_to_block_{i}" for i in range(scope.scene.blocks)]
@@ -203,7 +210,7 @@ class PuckToBlocks(Observable):
 
 @dataclass(frozen=True)
 class Touched(Observable):
-    """Flag: 1 after any paddle has touched any puck, else 0."""
+    """Flag that is 1 after any paddle has touched any puck, else 0."""
 
     def columns(self, scope: ObservationContext) -> list[Element]:
         return [Element("touched", 0.0, 1.0, 1.0)]
@@ -214,17 +221,17 @@ class Touched(Observable):
 
 @dataclass(frozen=True)
 class Goal(Observable):
-    """Goal position, and the vector to it from the own paddle or from puck 0.
+    """Position of the goal, and vector to it from the own paddle or puck 0, m.
 
-    The array of the memory is (..., 2) in the table frame.
+    The memory contains the goal (..., 2), table frame, m.
     """
 
     unit: tuple[float, float]
     x: float
     origin: str
-    """Body that is to reach the goal: "own" or "puck"."""
+    """Body from which the vector starts: "own" or "puck"."""
     name: str = "goal"
-    """Name in the memory."""
+    """Name of the goal in the memory."""
     goal = True
 
     def columns(self, scope: ObservationContext) -> list[Element]:
@@ -240,7 +247,10 @@ class Goal(Observable):
 
 @dataclass(frozen=True)
 class GoalVelocity(Observable):
-    """Goal velocity, ``memory["goal_velocity"]`` (..., 2) in the table frame."""
+    """Target velocity at the goal, m/s.
+
+    The memory contains ``goal_velocity`` (..., 2), table frame, m/s.
+    """
 
     most: float
     unit: float
@@ -255,7 +265,10 @@ class GoalVelocity(Observable):
 
 @dataclass(frozen=True)
 class PossessionTime(Observable):
-    """Time that each puck has been in reach of the own team, s; see `rewards.held`."""
+    """Time for which each puck has been within reach of the own team, s.
+
+    `rewards.held` computes it.
+    """
 
     most: float
 
@@ -269,7 +282,11 @@ class PossessionTime(Observable):
 
 @dataclass(frozen=True)
 class PerSeat(Observable):
-    """Memory values per seat (..., seats): the own one, then as in `OtherPaddles`."""
+    """Number of each seat, such as its lives, in the order of the paddles.
+
+    The memory contains ``name`` (..., seats). The own seat is the first one. The others
+    follow as in `OtherPaddles`.
+    """
 
     name: str
     most: float
@@ -287,9 +304,10 @@ class PerSeat(Observable):
 
 @dataclass(frozen=True)
 class IsThisSeat(Observable):
-    """Seat number in the memory, compared: 1 for this seat, -1 another, 0 none.
+    """Seat that the label names: 1 for the own seat, -1 for another, 0 for none.
 
-    ``memory[name]`` is (...) or, per puck, (..., pucks); see `rewards.last_toucher`.
+    The memory contains its number from 1, (...) or per puck (..., pucks), see
+    `rewards.last_toucher`.
     """
 
     name: str
@@ -307,7 +325,7 @@ class IsThisSeat(Observable):
 
 @dataclass(frozen=True)
 class FromMemory(Observable):
-    """Memory values per puck that are no vectors: flags and heights."""
+    """Quantity of the rules for each puck: a flag, a count, or a height, m."""
 
     name: str
     low: float
@@ -324,8 +342,8 @@ class FromMemory(Observable):
         kept, pucks = ego.kept(self.name), out.shape[-1]
         if kept.ndim != out.ndim - 1 or kept.shape[-1] != pucks:
             raise ValueError(
-                f"memory {self.name!r}: FromMemory shows a number for each puck, "
-                f"(..., {pucks}); it is {kept.shape}"
+                f"memory {self.name!r}: FromMemory needs a number for each puck, "
+                f"(..., {pucks}); got shape {kept.shape}"
             )
         value = kept[..., None, :]
         out[...] = value - ego.own[..., :1] if self.from_own else value

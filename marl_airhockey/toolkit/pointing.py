@@ -1,4 +1,4 @@
-"""Pointing: a velocity by which a paddle comes to rest where somebody points."""
+"""Pointing: control of a paddle by target positions."""
 
 from __future__ import annotations
 
@@ -9,36 +9,36 @@ from marl_airhockey.sim.core.geometry import length
 from marl_airhockey.types import Array
 
 GAIN = 25.0
-"""Commanded speed per distance near the target, 1/s"""
+"""Commanded speed per distance near the target, 1/s."""
 STEADY = 0.6
-"""Largest product of that and of a lag: beyond, the paddle swings about the target"""
+"""Largest product of gain and lag. Above it, the paddle oscillates."""
 BRAKE = 0.6
-"""Share of the seat's acceleration that is assumed for stopping in time"""
+"""Share of the seat's largest acceleration that is used for braking."""
 ARM_LAG = 0.08
-"""Time by which an arm answers late as a rule, s: a servo's lag, its dead time and half
-of a control step; `calibrate delay` measures the first two"""
+"""Typical lag of an arm, s: servo lag, dead time and half of a control step. `airhockey
+calibrate delay` measures the first two."""
 
 
 def point_to(
     view: View, target: Array, moving: Array | None = None, lag: float = 0.0
 ) -> Array:
-    """Return the actions (B, 2) that bring paddles to targets.
+    """Return the actions (B, 2) that move paddles to targets.
 
-    They are bounded by the seat's top speed and by a speed from which the paddle can
-    still stop in time; `limits` bounds them further, as for every driver.
+    The speed is at most the top speed of the seat, and at most the speed from which the
+    paddle can still brake in time. `limits` limits it further, as for every driver.
 
     Args:
-        view: of the seat.
-        target: (2,) or (B, 2), ego frame, m.
-        moving: velocity of the targets (2,) or (B, 2), m/s; None at rest.
-        lag: time by which the paddle answers late, s. It would go on by so much if it
-            were stopped now, and swings about the target if nobody compensates for it.
+        view: View of the seat.
+        target: Target positions (2,) or (B, 2), ego frame, m.
+        moving: Velocities of the targets (2,) or (B, 2), ego frame, m/s; None at rest.
+        lag: Lag of the paddle, s. A stopped paddle continues to move for this time. The
+            actions compensate for it; otherwise the paddle would oscillate.
     """
     gain = min(GAIN, STEADY / lag) if lag else GAIN
     way = target - view.state.paddle[:, view.seat]
     way = way - lag * view.state.paddle_velocity[:, view.seat]
     if moving is not None:
-        # With so much to go it is as fast as the target when it is there.
+        # At the target, the paddle then has the velocity of the target.
         way = way + (lag + 1.0 / gain) * moving
     far = np.maximum(length(way), 1e-9)
     brake = BRAKE * view.scene.seats[view.seat].acceleration

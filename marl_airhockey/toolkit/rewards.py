@@ -1,7 +1,7 @@
 """Rewards: measures of a transition that the rules of several scenarios use.
 
-Distances and paths of pucks, lifts (pucks that are hit and rise), possession and saves.
-All functions are pure and vectorized over the caller's leading axes.
+They measure distances and paths of pucks, lifts (pucks that are hit and rise),
+possession and saves. All functions are pure and vectorized over leading axes (...).
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from marl_airhockey.sim.core.touches import touched as touched
 from marl_airhockey.types import Array, Memory
 
 SLOW = 0.05
-"""Speed below which a puck is at rest (m/s)."""
+"""Speed below which a puck is at rest, m/s."""
 SHOT = 1.0
-"""Speed from which a puck on its way into a goal is a shot (m/s)."""
+"""Speed from which a puck that moves into a goal is a shot, m/s."""
 
 
 def tolerance(value: Array, bound: float, margin: float) -> Array:
-    """Return 1 where ``value`` is at most ``bound``, falling to e^-1 at ``margin``.
+    """Return 1 for values up to a bound, and an exponential decrease above it (...).
 
-    The fall is smooth; the function follows dm_control's of the same name.
+    The function is modelled on `tolerance` of dm_control.
 
     Args:
-        value: distance or error (...), not negative.
-        bound: largest value with the result 1.
-        margin: excess over the bound with the result e^-1.
+        value: Distances or errors (...), not negative.
+        bound: Largest value with the result 1.
+        margin: Excess over the bound with the result e^-1.
     """
     return np.exp(-np.maximum(value - bound, 0.0) / margin)
 
 
 def nearest(t: Transition) -> Array:
-    """(...) shortest distance of paddle 0 to puck 0 up to the first touch, m.
+    """Return the shortest distance from paddle 0 to puck 0 before a touch (...), m.
 
-    It continues ``gap`` of the memory. Its decrease rewards moving to the puck; as a
-    running minimum it cannot be exploited by moving back and forth.
+    It is the new value of ``gap`` in the memory. Its decrease rewards movement to the
+    puck. It is a running minimum, so moving back and forth gives no reward.
     """
     gap, old = (
         length(t.after.puck[..., 0, :] - t.after.paddle[..., 0, :]),
@@ -49,20 +49,17 @@ def nearest(t: Transition) -> Array:
 
 
 def approach(t: Transition) -> Array:
-    """(..., 1) distance by which paddle 0 came nearer to puck 0 than before, m.
-
-    It is that of ``gap`` in the memory, see `nearest`.
-    """
+    """Return the decrease of ``gap`` in the memory (..., 1), m; see `nearest`."""
     return np.asarray((t.memory["gap"] - t.new_memory["gap"])[..., None])
 
 
 def lost(t: Transition) -> Array:
-    """(...) bool: a puck crossed the first goal line, home."""
+    """Return True (...) if a puck crossed the first goal line, home."""
     return np.asarray(t.after.crossed[..., 0].any(-1))
 
 
 def gained(old: Array, new: Array) -> Array:
-    """(...) decrease of a best distance; 0 while there was none (infinite)."""
+    """Return the decrease of a shortest distance (...); 0 if the old is infinite."""
     none = np.isinf(old)
     return np.where(none, 0.0, np.where(none, 0.0, old) - np.where(none, 0.0, new))
 
@@ -70,14 +67,14 @@ def gained(old: Array, new: Array) -> Array:
 def alike(
     velocity: Array, wanted: Array, angle: float, share: float, slack: float
 ) -> Array:
-    """(...) bool: True where two velocities agree in direction and speed.
+    """Return True (...) where two velocities agree in direction and speed.
 
     Args:
-        velocity: (..., 2) m/s.
-        wanted: (..., 2) m/s.
-        angle: largest angle between them, rad.
-        share: largest error of the speed, as a share of the wanted speed.
-        slack: further error of the speed, m/s.
+        velocity: Velocities (..., 2), m/s.
+        wanted: Target velocities (..., 2), m/s.
+        angle: Largest angle between them, rad.
+        share: Largest error of the speed, as a share of the target speed.
+        slack: Additional error of the speed, m/s.
     """
     speed, aim = length(velocity), length(wanted)
     along = (velocity * wanted).sum(-1) >= np.cos(angle) * speed * aim
@@ -94,30 +91,30 @@ def enters(
     speed_share: float = 0.0,
     speed_slack: float = 0.0,
 ) -> tuple[Array, Array, Array]:
-    """Compare the path of puck 0 with a circle, at every substep after a touch.
+    """Compare the path of puck 0 with a circle, at every substep.
 
-    Only substeps count at which the puck has been touched and rises (moves away from
-    home).
+    A substep counts if the puck has been touched and rises (moves away from home).
 
     Args:
-        t: transition; the state after it has a ``path`` (..., K + 1, movers, 4).
-        centre: (..., 2) of the circle, m.
-        radius: of the circle, m.
-        velocity: (..., 2) wanted velocity in the circle, m/s; None for any.
-        angle: largest angle to the wanted velocity, rad.
-        speed_share: largest error of the speed, as a share of the wanted speed.
-        speed_slack: further error of the speed, m/s.
+        t: Transition; the state after it has a ``path`` (..., K + 1, movers, 4).
+        centre: Centre of the circle (..., 2), table frame, m.
+        radius: Radius of the circle, m.
+        velocity: Target velocity in the circle (..., 2), m/s; None for any velocity.
+        angle: Largest angle to the target velocity, rad.
+        speed_share: Largest error of the speed, as a share of the target speed.
+        speed_slack: Additional error of the speed, m/s.
 
     Returns:
-        ``entered`` (...) bool; ``gap`` (..., K + 1) to the circle's edge in m, infinite
-        where a substep does not count; ``error`` (..., K + 1) of the velocity, m/s.
+        True if the puck was in the circle with the target velocity (...). Distance to
+        the circle's edge (..., K + 1), m, which is negative inside and infinite in
+        substeps that do not count. Error of the velocity (..., K + 1), m/s.
 
     Raises:
-        ValueError: a state without a path.
+        ValueError: The state has no path.
     """
     after = t.after
     if after.path is None:
-        raise ValueError("enters: the scene must ask for the path (path=True)")
+        raise ValueError("enters: the state has no path; give the scene path=True")
     puck = after.path[..., after.bodies.paddles, :]
     dt = (after.time - t.before.time)[..., None]
     moment = dt * np.linspace(0.0, 1.0, puck.shape[-2])
@@ -137,10 +134,11 @@ def enters(
 
 
 def contact_height(t: Transition) -> Array:
-    """(..., pucks) x of each puck at its last contact with a paddle in this step, m.
+    """Return x of each puck at its last contact with a paddle (..., pucks), m.
 
-    During a contact it is the present x, else the x in free flight at the time when the
-    contact began; nan without a contact.
+    If the contact continues after the step, it is the current x. Otherwise it is x in
+    free flight at the time when the contact began. It is nan without a contact in this
+    step.
     """
     at = np.where(t.after.touched > 0, t.after.touched_at, np.nan)
     last = np.fmax.reduce(at, axis=-2)
@@ -155,11 +153,12 @@ def no_lifts(state: State) -> Memory:
 
 
 def lifts(t: Transition, lift: float) -> tuple[Memory, Array]:
-    """Follow pucks from a hit until they have risen by ``lift`` above it, m.
+    """Detect pucks that have risen by ``lift``, m, above their last hit.
 
     Returns:
-        New memory: ``armed``, 1 from the hit until then, and ``struck_at``, its x (m);
-        and True for pucks that have risen so far in this step. All (..., pucks).
+        Memory of two arrays (..., pucks), and True for pucks that have risen in this
+        step (..., pucks). ``armed`` is 1 from a hit until the puck has risen, and
+        ``struck_at`` is x of the hit, m.
     """
     height = contact_height(t)
     struck = ~np.isnan(height)
@@ -170,9 +169,13 @@ def lifts(t: Transition, lift: float) -> tuple[Memory, Array]:
 
 
 def last_toucher(who: Array, after: State) -> Array:
-    """(..., pucks) number of the seat that touched each puck last; ``who`` if none did.
+    """Return the number of the seat that touched each puck last (..., pucks).
 
     Seats are numbered from 1; 0 means none.
+
+    Args:
+        who: Numbers before the step (..., pucks).
+        after: State after the step.
     """
     at = np.where(after.touched > 0, after.touched_at, -1.0)
     at = np.where(after.touching, np.inf, at)
@@ -185,9 +188,10 @@ def last_toucher(who: Array, after: State) -> Array:
 
 
 def held(scene: Scene, t: Transition) -> Array:
-    """(..., seats, pucks) time a puck has been in reach of a seat or its teammates, s.
+    """Return the time for which teams have had pucks in reach (..., seats, pucks), s.
 
-    It continues ``held`` of the memory.
+    The reach of a team is the reach of any of its seats. The result is the new value of
+    ``held`` in the memory.
     """
     dt = (t.after.time - t.before.time)[..., None, None]
     has = in_reach(scene, t.after.puck)
@@ -198,13 +202,14 @@ def held(scene: Scene, t: Transition) -> Array:
 
 
 def lying(t: Transition, clocks: Array) -> Array:
-    """(..., pucks) time a puck has been slower than 0.05 m/s out of every reach, s.
+    """Return the time for which pucks have rested out of reach (..., pucks), s.
 
-    It continues ``lying`` of the memory.
+    A puck rests if it is slower than 0.05 m/s. The result is the new value of ``lying``
+    in the memory.
 
     Args:
-        t: transition.
-        clocks: result of `held` for it.
+        t: Transition of one step.
+        clocks: Result of `held` for the transition (..., seats, pucks), s.
     """
     dt = (t.after.time - t.before.time)[..., None]
     lies = (length(t.after.puck_velocity) < SLOW) & ~(clocks > 0.0).any(-2)
@@ -212,7 +217,7 @@ def lying(t: Transition, clocks: Array) -> Array:
 
 
 def in_reach(scene: Scene, point: Array) -> Array:
-    """(..., seats) bool: each seat's paddle can touch a puck at a point (..., 2)."""
+    """Return True (..., seats) if the paddle can touch a puck at (..., 2), m."""
     normals, offsets = reaches(scene.table, scene.seats)
     touch = scene.table.paddle_radius + scene.table.puck_radius
     ahead = (normals * point[..., None, None, :]).sum(-1) + offsets
@@ -221,11 +226,11 @@ def in_reach(scene: Scene, point: Array) -> Array:
 
 
 def on_goal(scene: Scene, state: State, seat: int) -> Array:
-    """(..., pucks) bool: the puck flies straight into the goal of a seat's side."""
+    """Return True (..., pucks) for shots that move straight into a seat's goal."""
     side = scene.seats[seat].side
     width = next(g.width for g in scene.goal_lines if g.side == side)
     if width is None:
-        raise ValueError(f"seat {seat}: its side has no goal of some width")
+        raise ValueError(f"seat {seat}: its side has no goal with a width")
     normal, offset = scene.table.normals[side], scene.table.offsets[side]
     along = np.array([-normal[1], normal[0]])
     middle = sum(scene.table.ends(side)) @ along / 2.0
@@ -238,16 +243,17 @@ def on_goal(scene: Scene, state: State, seat: int) -> Array:
 
 
 def saves(scene: Scene, t: Transition, toucher: Array) -> Array:
-    """(..., seats, seats) number of shots of each seat (last axis) that each stopped.
+    """Return the number of shots that each seat stopped (..., seats, seats).
 
-    A seat stops a shot when its paddle touches a puck that flew straight into its goal
-    at the start of the step and that a seat of another team had touched last.
+    The last axis is the seat that shot. A seat stops a shot when its paddle touches a
+    puck that moved straight into its goal at the start of the step. A seat of another
+    team must have touched the puck last.
 
     Args:
-        scene: scene of the scenario; its goal lines have widths.
-        t: transition.
-        toucher: (..., pucks) number of who touched each puck last before the step, from
-            1; 0 for nobody. See `last_toucher`.
+        scene: Scene of the scenario, whose goal lines have widths.
+        t: Transition of one step.
+        toucher: Number of the seat that touched each puck last before the step
+            (..., pucks), see `last_toucher`.
     """
     rows = []
     for i, keeper in enumerate(scene.seats):

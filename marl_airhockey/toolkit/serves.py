@@ -1,4 +1,4 @@
-"""Serves: pucks that are put around the middle of the table, moving slowly."""
+"""Serves: slow pucks that start around the centre of the table."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from marl_airhockey.toolkit.starts import SPIN
 from marl_airhockey.types import Array
 
 PITCH = 0.12
-"""Distance between two served pucks, and between two lines of them (m)."""
+"""Distance between two served pucks, and between two lines of them, m."""
 LINES = (0.0, PITCH, -PITCH, 2 * PITCH, -2 * PITCH)
-"""x of the lines on which pucks are served, in the order in which they fill (m)."""
+"""x of the lines on which pucks are served, m, the line that fills first first."""
 STEP = 0.02
-"""Distance between two positions on a line that are tried (m)."""
+"""Distance between two tested positions on a line, m."""
 GAP = 0.005
-"""Least distance between a served puck and anything else (m)."""
+"""Smallest distance between a served puck and any other body, m."""
 SPEED = 0.5
-"""Speed of a served puck (m/s)."""
+"""Speed of a served puck, m/s."""
 
 
 def most_served(scene: Scene) -> int:
-    """Return how many pucks a table has room for when all are served together."""
+    """Return the largest number of pucks that can be served together."""
     return sum(_on_line(scene, x) for x in LINES)
 
 
 def _room(scene: Scene, x: float) -> float:
-    """Return how far from the middle a puck may be on the line at x, m; < 0: none."""
+    """Return the largest |y| of a puck on the line at x, m; below 0 if none fits."""
     table = scene.table
     inside = table.normals[:, 0] * x + table.offsets - table.puck_radius - GAP
     slope = np.abs(table.normals[:, 1])
@@ -50,13 +50,14 @@ def _on_line(scene: Scene, x: float) -> int:
 
 @cache
 def _positions(scene: Scene) -> Array:
-    """Return the positions that are tried for each puck, best first (pucks, K, 2), m.
+    """Return the tested positions of each puck, best first (pucks, K, 2), m.
 
-    Pucks are side by side on the middle line, and on the next ones when it is full. A
-    puck's own position is first; others on its line follow, then those on other lines.
+    Pucks are side by side on the middle line, and on the next lines when it is full.
+    The first position of a puck is its own. Other positions on its line follow, then
+    positions on other lines.
 
     Raises:
-        ValueError: more pucks than fit.
+        ValueError: There are more pucks than fit, or obstacles leave no space.
     """
     own: list[tuple[float, float]] = []
     for x in LINES:
@@ -64,7 +65,7 @@ def _positions(scene: Scene) -> Array:
         own += [(x, PITCH * (k - 0.5 * (count - 1))) for k in range(count)]
     if len(own) < scene.pucks:
         raise ValueError(
-            f"pucks: {scene.pucks} do not fit where they are served, {len(own)} do"
+            f"pucks: {scene.pucks} cannot be served together, at most {len(own)}"
         )
     obstacles = ReachPlanes.of(scene.table, scene.seats).obstacles
     tried = []
@@ -80,8 +81,8 @@ def _positions(scene: Scene) -> Array:
         tried.append([(line, -minus) for _, _, minus, line in sorted(found)])
     most = max(map(len, tried))
     if not min(map(len, tried)):
-        raise ValueError("obstacles: they leave no room for a serve")
-    # A last position that is repeated changes nothing.
+        raise ValueError("obstacles: they leave no space for a serve; move them")
+    # Repeating the last position has no effect.
     return np.array([row + row[-1:] * (most - len(row)) for row in tried])
 
 
@@ -93,22 +94,22 @@ def serve(
     heading: Array,
     rows: Array | None = None,
 ) -> None:
-    """Put a puck in the middle, moving within 0.3 rad of a heading.
+    """Put a puck in the centre, with a velocity within 0.3 rad of a heading.
 
-    The state is changed in place, but for its paddles. Where a paddle or another puck
-    is there, the puck is put at the nearest free point of its line, or of the
-    next one.
+    The state is changed in place, except for its paddles. If a paddle or another puck
+    is there, the puck is put at the nearest free point of its line, or of the next
+    line.
 
     Args:
-        rng: one stream per row.
-        scene: what is on the table.
-        state: rows (W,).
-        puck: its index.
-        heading: (W,) or (), rad in the table frame.
-        rows: (W,) bool: True for the rows to serve; None for all.
+        rng: Random streams, one per row.
+        scene: Scene of the state.
+        state: State with rows (W,), table frame.
+        puck: Index of the puck.
+        heading: Directions of the velocity (W,) or (), table frame, rad.
+        rows: True for the rows to serve (W,); None for all.
 
     Raises:
-        ValueError: more pucks than fit, see `most_served`.
+        ValueError: There are more pucks than fit, see `most_served`.
     """
     bodies, draws = state.bodies, rng.uniform(-1.0, 1.0, 2)
     some = np.ones(len(draws), np.bool_) if rows is None else rows
@@ -122,7 +123,7 @@ def serve(
 def serve_all(
     rng: RandomStreams, scene: Scene, state: State, heading: Array, between: float = 0.0
 ) -> None:
-    """Serve all pucks, the heading of each ``between`` rad left of the one before."""
+    """Serve all pucks, each with a heading ``between`` rad left of the previous one."""
     state.puck[:] = _positions(scene)[:, 0]
     for k in range(scene.pucks):
         serve(rng, scene, state, k, heading + k * between)
@@ -142,7 +143,7 @@ def _serve(
     heading: Array,
     edge: Array,
 ) -> None:
-    """Serve in some worlds; ``edge`` is the speed of the edge per speed of the puck."""
+    """Serve a puck in some worlds; ``edge`` is its edge speed divided by its speed."""
     body = first + puck
     for w in worlds:
         chosen, most = 0, -np.inf

@@ -1,4 +1,4 @@
-"""Shots: feasible goals, drawn from legal shots at a falling puck."""
+"""Feasible goals, sampled from shots at a falling puck."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ LAWS = (
     *("wall_restitution_slope", "wall_friction"),
     *("paddle_restitution", "paddle_friction", "paddle_speed"),
 )
-"""Names of the parameters that a shot depends on."""
+"""Names of the physics parameters that affect a shot."""
 STEP, STEPS = 0.005, 500
-"""Time between points of a way (s), and their number"""
+"""Time between two points of a path, s, and number of points."""
 TRIES = 200
-"""Number of shots tried at a puck; about 3 % are legal and reach such a place."""
+"""Largest number of shots per puck. About 3 % are legal and reach a valid goal."""
 PUSH = (0.2, 0.6)
-"""Range of the paddle's speed along the normal, as a share of its top speed."""
+"""Range of the paddle's speed along the contact normal, as a share of top speed."""
 STRUCK = ((-0.65, 0.0), (-0.30, 0.0))
-"""Range of x at which the puck is struck (m)."""
+"""Ends of the range of x at which the puck is struck, m."""
 PADDLE = ((-0.74, -0.24), (-0.38, 0.24))
-"""Lower and upper corner of the paddle's places (m)."""
+"""Lower and upper corner of the positions of the paddle, m."""
 GOAL = ((0.05, -0.205), (0.738, 0.205))
-"""Lower and upper corner of the goals' places (m)."""
+"""Lower and upper corner of the positions of goals, m."""
 
 
 class Places(NamedTuple):
-    """Places of a shot on a table, each by its lower and upper corner (2, 2), m."""
+    """Boxes of a shot on a table: lower and upper corner (2, 2), m."""
 
     struck: Array
     paddle: Array
@@ -48,25 +48,26 @@ class Places(NamedTuple):
     @staticmethod
     @cache
     def on(table: Table) -> Places:
-        """Carry those of the standard table over to another."""
+        """Map the boxes of the standard table to another table."""
         boxes = (STRUCK, PADDLE, GOAL)
         return Places(*(table.from_standard(np.array(box)) for box in boxes))
 
     def ranges(self) -> tuple[Array, Array]:
-        """Return the ends (4,) of the ranges of a shot.
+        """Return the lower and the upper ends (4,) of the ranges of a shot.
 
-        x at which the puck is struck (m), angle of the normal (rad), speed of the
-        paddle along it (of top speed), and which point of the way is the goal.
+        The ranges are x at which the puck is struck, m; angle of the contact normal,
+        rad; speed of the paddle along it, share of top speed; and index of the goal on
+        the path, 0 to 1.
         """
         rows = np.array([self.struck[:, 0], (-0.5, 0.5), PUSH, (0.0, 1.0)])
         return rows[:, 0], rows[:, 1]
 
 
 def playable_puck(rng: RandomStreams, scene: Scene) -> Array:
-    """Draw falling pucks that pass where a paddle can be, under the scene's physics.
+    """Sample falling pucks that pass the workspace with the scene's default physics.
 
     Returns:
-        (W, 5), see `starts.falling_puck`.
+        Pucks (W, 5), columns as in `starts.falling_puck`.
     """
     physics = {name: p.default for name, p in PARAMETERS.items()} | scene.defaults
     table, places = scene.table, Places.on(scene.table)
@@ -85,23 +86,24 @@ def playable_puck(rng: RandomStreams, scene: Scene) -> Array:
 def draw_shots(
     rng: RandomStreams, scene: Scene, state: State, physics: Mapping[str, Array]
 ) -> Array:
-    """Draw a goal on a shot at puck 0 of each world that a robot seat can play.
+    """Sample a goal for puck 0 of each world from shots that a robot seat can play.
 
-    The puck falls to a place in `STRUCK` and is struck there with a contact normal
-    within 0.5 rad of straight up and a normal paddle speed of `PUSH`, the paddle's
-    centre lying in `PADDLE`; it slides on with banks, under the physics of the episode.
-    The goal is a random point of that path in `GOAL`, within 30 deg of straight up and
-    vx at least 0.5 m/s. Where none is found, it is (0.39, 0), straight up at 0.7 m/s.
-    Places are those of the standard table, see `Table.from_standard`.
+    The puck falls to an x in `STRUCK`. A paddle with its centre in `PADDLE` strikes it
+    there. The contact normal is within 0.5 rad of straight up, and the speed along it
+    is in `PUSH`. The puck then slides and bounces off the long walls, with the physics
+    of the episode. The goal is a random point of this path in `GOAL`, with a velocity
+    within 30 deg of straight up and vx of at least 0.5 m/s. If there is none, the goal
+    is (0.39, 0) m, straight up at 0.7 m/s. Positions are those of the standard table,
+    see `Table.from_standard`.
 
     Args:
-        rng: one stream per row.
-        scene: table and seat.
-        state: rows (W,), one of which each shot begins in.
-        physics: parameters by name, (W,) each.
+        rng: Random streams, one per row.
+        scene: Scene with the table and the seat.
+        state: States (W,) in which the shots begin, table frame.
+        physics: Physics parameters (W,) by name.
 
     Returns:
-        (W, 4) x, y, m, vx, vy, m/s, of the goals.
+        Goals (W, 4): x and y, m, vx and vy, m/s, table frame.
     """
     table, laws = scene.table, {name: physics[name] for name in LAWS}
     half = float(table.size[1]) / 2 - table.puck_radius
@@ -134,14 +136,14 @@ def _strike(
     scene: Scene,
     physics: Mapping[str, Array],
 ) -> tuple[Array, Array]:
-    """Strike each puck once; return it (W, 5), and whether the shot is legal (W,).
+    """Strike each puck once; return pucks (W, 5), and True for legal shots (W,).
 
     Args:
-        falls: ways of all pucks, see `starts.roll`.
-        worlds: (W,) those that are struck, by index.
-        draws: (W, 4) in `Places.ranges`.
-        scene: table.
-        physics: parameters by name, (W,) each.
+        falls: Paths of all pucks (B, T, 5), see `starts.roll`.
+        worlds: Indices of the struck pucks (W,).
+        draws: Samples (W, 4) in `Places.ranges`.
+        scene: Scene with the table.
+        physics: Physics parameters (W,) by name.
     """
     height, angle, table = draws[:, 0], draws[:, 1], scene.table
     below = falls[worlds, :, 0] <= height[:, None]
@@ -159,10 +161,10 @@ def _strike(
 def _hit(
     puck: Array, normal: Array, push: Array, restitution: Array, friction: Array
 ) -> Array:
-    """Hit pucks (W, 5), changed, by paddles that move along their normals.
+    """Hit pucks (W, 5), in place, with paddles that move along contact normals.
 
     Returns:
-        True where the paddle meets the puck (W,).
+        True where the paddle approaches the puck (W,).
     """
     met = np.zeros(len(puck), np.bool_)
     for w in range(len(puck)):
@@ -177,7 +179,7 @@ def _hit(
 
 @compiled()
 def _choose(path: Array, end: float, goal: Array, choice: Array, moment: Array) -> None:
-    """Choose a valid index of each rising path (W, T, 4); -1 if there is none."""
+    """Choose a valid index of each rising path (W, T, 5); -1 if there is none."""
     steep = np.tan(np.radians(30.0))
     for w in range(len(path)):
         good, moment[w] = 0, -1

@@ -1,4 +1,4 @@
-"""Samplers of initial states that scenarios share."""
+"""Samplers of start states that scenarios share."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from marl_airhockey.types import Array
 
 PADDLE_X = (-0.70, -0.60)
 PADDLE_Y = (-0.10, 0.10)
-"""Range of y at which a single paddle starts unless its scenario sets it (m)."""
+"""Range of y in which a single paddle starts, unless the scenario sets it, m."""
 
 
 def uniform_box(
     rng: RandomStreams, table: Table, x: tuple[float, float], y: tuple[float, float]
 ) -> Array:
-    """(W, 2) uniform points in a box of the standard table, carried over to ``table``.
+    """Sample uniform points (W, 2), m, in a box of the standard table.
 
-    See `Table.from_standard`; m.
+    `Table.from_standard` maps them to ``table``.
     """
     low, high = _corners(table, x, y)
     return rng.uniform(low, high, 2)
@@ -42,16 +42,16 @@ def _corners(
 
 
 SPIN = 0.6
-"""Highest speed of a puck's edge by spin at its start, as a share of its speed.
+"""Largest speed of a puck's edge by spin at the start, as a share of its speed.
 
-After a bounce, half of the pucks had at most 0.09 and nine in ten 0.44 on a
-professional table, 0.59 and 0.83 on a wooden one (the records of the documentation's
-page on physics).
+After a bounce on a professional table, half of the pucks had at most 0.09 and nine in
+ten at most 0.44. On a wooden table these values are 0.59 and 0.83. The page on physics
+of the documentation describes the data.
 """
 FALLING = np.array([(0.4, 0.8), (-0.2, 0.2), (-1.0, -0.2), (-0.3, 0.3), (-SPIN, SPIN)])
-"""Ranges of x, y (m), vx, vy (m/s) and `SPIN` of a puck that falls."""
+"""Ranges of x, y, m, vx, vy, m/s, and edge speed / speed of a falling puck."""
 HOME = np.array([PADDLE_X, PADDLE_Y, *FALLING])
-"""The same behind those of x and y of the paddle (m)."""
+"""Ranges of x and y of the paddle, m, followed by `FALLING`."""
 
 
 @cache
@@ -64,10 +64,10 @@ def _home(table: Table) -> Array:
 
 
 def falling_puck(rng: RandomStreams, table: Table) -> Array:
-    """Draw pucks that fall from the far half.
+    """Sample pucks that fall from the far half.
 
     Returns:
-        (W, 5) x, y, vx, vy, m, m/s, and speed of the edge by spin, m/s.
+        Pucks (W, 5): x and y, m, vx, vy and speed of the edge by spin, m/s.
     """
     puck = rng.uniform(*_home(table)[:, 2:], 5)
     _spin(puck)
@@ -76,7 +76,7 @@ def falling_puck(rng: RandomStreams, table: Table) -> Array:
 
 @compiled()
 def _spin(puck: Array) -> None:
-    """Multiply the last of five columns, a share of the puck's speed, by it."""
+    """Multiply the last of five columns, a share of the speed, by the speed."""
     for w in range(len(puck)):
         puck[w, 4] *= math.sqrt(puck[w, 2] ** 2 + puck[w, 3] ** 2)
 
@@ -85,7 +85,7 @@ def _spin(puck: Array) -> None:
 def _drop(
     puck: Array, body: int, position: Array, velocity: Array, edge: Array
 ) -> None:
-    """Place a body of all worlds by columns of `falling_puck`."""
+    """Set a body of all worlds to the columns of `falling_puck`."""
     for w in range(len(puck)):
         position[w, body, 0], position[w, body, 1] = puck[w, 0], puck[w, 1]
         velocity[w, body, 0], velocity[w, body, 1] = puck[w, 2], puck[w, 3]
@@ -93,9 +93,9 @@ def _drop(
 
 
 def falling(rng: RandomStreams, scene: Scene) -> State:
-    """Draw states with one paddle at home and pucks that fall from the far half.
+    """Sample states with one paddle at home and pucks that fall from the far half.
 
-    No puck overlaps another.
+    Pucks do not overlap.
     """
     table, state = scene.table, scene.still_state(len(rng))
     draws = rng.uniform(*_home(table), 7)
@@ -117,7 +117,7 @@ def falling(rng: RandomStreams, scene: Scene) -> State:
 
 
 def puck_gap(state: State) -> Array:
-    """(W,) distance of paddle 0 to puck 0, m."""
+    """Return the distance from paddle 0 to puck 0 (W,), m."""
     gap = state.puck[:, 0] - state.paddle[:, 0]
     return np.asarray(np.hypot(gap[:, 0], gap[:, 1]))
 
@@ -129,17 +129,17 @@ def roll(
     half: float,
     physics: Mapping[str, Array | float],
 ) -> Array:
-    """Compute the ways of pucks that slide, fall and bank off the long walls.
+    """Compute the paths of pucks that slide, fall and bounce off the long walls.
 
     Args:
-        start: (W, 5) x, y, m, vx, vy and speed of the edge by spin, m/s.
-        seconds: time between two points of a way, s.
-        count: number of points T, the start included.
-        half: largest |y| of the puck's centre, m.
-        physics: parameters by name, one for all or (W,) each.
+        start: Pucks (W, 5): x and y, m, vx, vy and speed of the edge by spin, m/s.
+        seconds: Time between two points of a path, s.
+        count: Number of points T, including the start.
+        half: Largest |y| of the puck's centre, m.
+        physics: Physics parameters by name, one for all pucks or (W,).
 
     Returns:
-        (W, T, 5), columns as those of the start.
+        Paths (W, T, 5) with the columns of the start.
     """
     names = (
         *("puck_damping", "puck_drag", "wall_restitution", "wall_restitution_slope"),
@@ -169,11 +169,11 @@ def _roll(start: Array, h: float, half: float, laws: Array, out: Array) -> None:
             way[0], way[1], way[2], way[3], way[4] = x, y, vx, vy, edge
             dx, dy, ex, ey = fly(vx, vy, h, gx, gy, damping, drag)
             if abs(y + dy) > half and vy * y > 0.0:
-                # As far as the wall, a bounce, and on.
+                # Move to the wall, bounce, and move for the remaining time.
                 share = max((half - abs(y)) / abs(dy), 0.0)
                 dx, dy, vx, vy = fly(vx, vy, share * h, gx, gy, damping, drag)
                 x, y, left = x + dx, y + dy, (1.0 - share) * h
-                # Along the normal turned by +90 degrees.
+                # The tangent is the normal turned by +90 degrees.
                 side = 1.0 if vy > 0.0 else -1.0
                 e = wall_restitution(abs(vy), restitution, slope)
                 push = impulse(abs(vy), side * vx - edge, e, friction, 1.0, 3.0)[1]
@@ -183,7 +183,7 @@ def _roll(start: Array, h: float, half: float, laws: Array, out: Array) -> None:
 
 
 def inside(rng: RandomStreams, scene: Scene, seat: int, margin: float = 0.0) -> Array:
-    """(W, 2) points in a seat's reach, ``margin`` m from its edges, table frame, m."""
+    """Sample points (W, 2), table frame, m, at least ``margin`` inside a workspace."""
     polygon = np.asarray(scene.seats[seat].reach)
     normals, offsets = half_planes(scene.seats[seat].reach)
     low, high = polygon.min(0) + margin, polygon.max(0) - margin
@@ -199,7 +199,7 @@ def inside(rng: RandomStreams, scene: Scene, seat: int, margin: float = 0.0) -> 
 
 
 NARROW_TRIES = 50
-"""Number of draws from narrowed ranges before whole ones are taken."""
+"""Number of samples from narrowed ranges before full ranges are used."""
 
 
 def redraw(
@@ -207,13 +207,13 @@ def redraw(
     sample: Callable[[RandomStreams], Array],
     accept: Callable[[Array], Array],
 ) -> Array:
-    """Draw rows by ``sample``, each again until ``accept`` is True for it.
+    """Sample rows, each again until ``accept`` is True for it.
 
-    Rows that narrowed ranges do not give (`RandomStreams.spread`) are drawn from whole
-    ones.
+    A row that is not found in narrowed ranges (`RandomStreams.spread`) is sampled from
+    full ranges.
 
     Raises:
-        RuntimeError: a row that is not accepted in 1000 tries.
+        RuntimeError: A row is not accepted in 1000 tries.
     """
     rows = sample(rng)
     for k in range(1000):
@@ -224,5 +224,5 @@ def redraw(
         some.spread = some.spread if k < NARROW_TRIES else 1.0
         rows[again] = sample(some)
     raise RuntimeError(
-        "start: no acceptable first state in 1000 tries; are there too many bodies?"
+        "start: found no valid start state in 1000 tries; use fewer bodies"
     )

@@ -1,6 +1,6 @@
-"""Tactics of scripted players of games: prediction, aiming and playing strength.
+"""Tactics of scripted drivers in games: prediction, aim and playing strength.
 
-All arrays are in the ego frame of a seat, over W worlds.
+All arrays are in the ego frame of a seat, with one row for each of W worlds.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from marl_airhockey.types import Array
 
 
 class Skill(NamedTuple):
-    """Skill of a scripted player."""
+    """Skill of a scripted driver."""
 
     pace: float
-    """Largest share of the top speed that it commands"""
+    """Largest commanded speed, as a share of top speed."""
     lag: float
-    """Time by which it predicts pucks too late (s)"""
+    """Time by which its predictions of pucks are late, s."""
 
 
 STRENGTHS = {
@@ -40,10 +40,10 @@ STRENGTHS = {
 
 @dataclass
 class Scripted(Driver):
-    """Scripted player of games with a selectable strength.
+    """Scripted driver with a selectable strength in games.
 
     Raises:
-        ValueError: an unknown strength.
+        ValueError: The strength is unknown.
     """
 
     strength: str = "strong"
@@ -55,7 +55,7 @@ class Scripted(Driver):
         self._skill = STRENGTHS[self.strength]
 
     def _paced(self, action: Array, view: View) -> Array:
-        """(W, 2) fractions of top speed of velocities (m/s), at most its pace."""
+        """Return velocities (W, 2), m/s, as shares of top speed, at most the pace."""
         share = action / view.top_speed[:, None]
         most = self._skill.pace / np.maximum(length(share), 1e-9)
         return share * np.minimum(most, 1.0)[:, None]
@@ -66,15 +66,15 @@ class Field:
     """Field of a game in the ego frame of a seat: its edges and goals."""
 
     edge: float
-    """Coordinate x of the own side (m)."""
+    """x of the own side, m."""
     half: float
-    """Half the width of the table for a puck's centre (m); infinite on polygons."""
+    """Largest |y| of a puck's centre, m; infinite on polygons."""
     keep: float
-    """Largest |y| of a shot at the own goal (m)."""
+    """Largest |y| of a shot at the own goal, m."""
     targets: Array
-    """Points in the goals of other teams (T, 2), m; empty without any."""
+    """Points in the goals of other teams (T, 2), m; empty if there are none."""
     walls: Walls
-    """Walls, as it counts on them."""
+    """Walls for predictions."""
 
     @staticmethod
     @lru_cache(maxsize=64)
@@ -103,15 +103,16 @@ class Field:
 
     @property
     def sides(self) -> tuple[float, float, float]:
-        """`half` (m), restitution and friction of the long walls."""
+        """`half`, m, and restitution and friction of the long walls."""
         return self.half, self.walls.restitution, self.walls.friction
 
 
 def nearest_puck(view: View, field: Field, lag: float) -> tuple[Array, Array]:
-    """Reckon place and velocity (W, 2) of the puck that is, or will be, nearest.
+    """Predict the puck that is or will be nearest: position and velocity (W, 2).
 
-    Pucks are brought forward over the reaction of the game, less ``lag``, see
-    `extrapolation.extrapolate_rows`; a longer lag takes them straight back.
+    Pucks are extrapolated over the reaction time of the game minus ``lag``, s, see
+    `extrapolation.extrapolate_rows`. With a longer lag they are moved back in a
+    straight line.
     """
     place, motion = view.state.puck, view.state.puck_velocity
     ahead = view.reaction - lag
@@ -125,13 +126,13 @@ def nearest_puck(view: View, field: Field, lag: float) -> tuple[Array, Array]:
 
 
 def guard(view: View, field: Field, depth: float, lag: float) -> Array:
-    """(W, 2) points on a line before the goal, where the puck will cross it, m.
+    """Return the points (W, 2), m, at which the puck crosses a line before the goal.
 
     Args:
-        view: view of the seat.
-        field: see `Field`.
-        depth: distance of the line from the near edge of the reach, m.
-        lag: Time by which pucks are predicted too late, s.
+        view: View of the seat.
+        field: Field of the seat.
+        depth: Distance of the line from the near edge of the workspace, m.
+        lag: Time by which predictions of pucks are late, s.
     """
     line = view.reach[:, 0].min() + depth
     place, motion = nearest_puck(view, field, lag)
@@ -143,7 +144,7 @@ def guard(view: View, field: Field, depth: float, lag: float) -> Array:
 
 
 STEP, HORIZON = 0.05, 1.2
-"""Time step and horizon of the prediction of a puck's path (s)."""
+"""Time step and horizon of the prediction of a puck's path, s."""
 
 
 @inner(error_model="numpy")
@@ -157,7 +158,7 @@ def _moved(
     restitution: float,
     friction: float,
 ) -> tuple[float, float]:
-    """Return the place of a puck without spin and drag after a time, m."""
+    """Return the position, m, of a puck without spin and drag after a time, s."""
     for _ in range(4):
         wall = half if vy > 0.0 else -half
         due = max((wall - y) / vy, 0.0) if vy != 0.0 else np.inf
@@ -178,7 +179,7 @@ def _slide_on(
     restitution: float,
     friction: float,
 ) -> Array:
-    """Return places (W, 2) of pucks after some times (W,), s."""
+    """Return the positions (W, 2), m, of pucks after some times (W,), s."""
     out = np.empty_like(place)
     for w in range(len(out)):
         x, y, vx, vy = place[w, 0], place[w, 1], motion[w, 0], motion[w, 1]
@@ -201,11 +202,11 @@ def _find_strike(
     restitution: float,
     friction: float,
 ) -> tuple[Array, Array, Array]:
-    """Find when and where a paddle can first be behind a puck, and the direction then.
+    """Find the first time at which a paddle can be behind a puck.
 
     Returns:
-        Time (W,), s, infinite if never; position of the puck then (W, 2), m, its
-        present one if never; unit vector from there to the aim (W, 2).
+        Times (W,), s, infinite if there is none. Positions of the puck at this time,
+        or now if there is none (W, 2), m. Unit vectors from there to the aim (W, 2).
     """
     due, there, way = np.empty(len(own)), np.empty_like(own), np.empty_like(own)
     for w in range(len(own)):
@@ -233,20 +234,20 @@ def attack(
 ) -> tuple[Array, Array]:
     """Compute velocities that strike the puck at a point.
 
-    The puck is struck at the first time at which the paddle can be behind it; until
-    then the paddle waits a little behind, and strikes through the puck when it is due.
+    The puck is struck at the first time at which the paddle can be behind it. Until
+    then the paddle waits a little behind this position.
 
     Args:
-        view: view of the seat.
-        field: see `Field`.
-        aim: (W, 2) m.
-        pace: largest share of top speed.
-        lag: Time by which pucks are predicted too late, s.
-        shot: share of that speed at which it strikes.
+        view: View of the seat.
+        field: Field of the seat.
+        aim: Points to aim at (W, 2), m.
+        pace: Largest speed, as a share of top speed.
+        lag: Time by which predictions of pucks are late, s.
+        shot: Speed of the strike, as a share of the largest speed.
 
     Returns:
-        Velocities (W, 2), m/s, and times to the strike (W,), s, infinite where the puck
-        cannot be struck.
+        Velocities (W, 2), m/s, and times until the strike (W,), s, which are infinite
+        if the puck cannot be struck.
     """
     own, speed = view.state.paddle[:, view.seat], pace * view.top_speed
     place, motion = nearest_puck(view, field, lag)
@@ -265,7 +266,7 @@ def attack(
     ready = (along > -0.01) & (along < 0.2) & (length(aside) < 0.02)
     strike = np.where(rest, ready, (due < 0.11) & (length(aside) < 0.06))
     through = way * (shot * speed)[:, None] + aside * 12.0
-    # Around the puck, not through it, when it is nearer to home than the paddle.
+    # Move around the puck if it is nearer to home than the paddle.
     wrong = (own[:, 0] > there[:, 0] - 0.3 * touch) & (due < 0.25)
     room = np.where(own[:, 1] >= there[:, 1], 1.0, -1.0) * touch * 1.25
     detour = np.stack([there[:, 0] - 1.2 * touch, there[:, 1] + room], -1)
@@ -275,7 +276,7 @@ def attack(
 
 
 def open_goal(view: View, field: Field) -> Array:
-    """(W, 2) point in the other goals whose shot passes farthest from paddles, m."""
+    """Return the goal points (W, 2), m, whose shots pass farthest from paddles."""
     if not len(field.targets):
         return np.broadcast_to(np.array([-field.edge, 0.0]), (len(view.rng), 2))
     place, _ = nearest_puck(view, field, 0.0)

@@ -1,4 +1,4 @@
-"""Versus: base of games of two teams with a goal at either end."""
+"""Base of games of two teams with a goal at each end."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from marl_airhockey.types import Array, Memory
 
 @dataclass(frozen=True, kw_only=True)
 class Versus(Scenario):
-    """Game of two teams with a goal at either end.
+    """Game of two teams with a goal at each end.
 
     A goal gives its team a reward of 1 and the other team -1. The first team with
     ``goals_to_win`` goals, and more than the other team, wins. If the time limit ends a
     level game, the team with more shots on goal wins, so that attacking is worth more
     than waiting. After a goal the puck is served from the centre to the team that
     conceded it. A team that has the puck within reach for ``possession`` seconds loses
-    it to the other team. A puck that rests where nobody reaches it is served again.
+    it to the other team. A puck that rests out of reach of all paddles is re-served.
     """
 
     announced = ("goals", "stopped", "serve")
@@ -35,17 +35,17 @@ class Versus(Scenario):
     seconds: Seconds = 60.0
     reaction: Latency = 0.15
     goals_to_win: int = 7
-    """Number of goals that wins."""
+    """Number of goals that a team needs to win."""
     pucks: int = 1
     """Number of pucks in play."""
     goal_width: Metres = 0.30
-    """Width of the goal lines (m)."""
+    """Width of the goal lines, m."""
     possession: Seconds = 5.0
-    """Longest time that a team may have a puck in its reach (s)."""
+    """Largest time for which a team may have a puck within reach, s."""
     scored_weight: Weight = 1.0
-    """Reward of a goal; to concede one costs 1."""
+    """Reward of a goal. A conceded goal gives a reward of -1."""
     shot_weight: Weight = 0.0
-    """Reward of a shot on goal that was stopped; its cost for who stopped it."""
+    """Reward of a stopped shot on goal, and cost for the team that stopped it."""
     jitter_weight: Weight = 0.0
 
     def __post_init__(self) -> None:
@@ -53,14 +53,13 @@ class Versus(Scenario):
         most = serves.most_served(self.scene)
         if self.pucks > most:
             raise ValueError(
-                f"pucks: {self.pucks} do not fit side by side; this table has room for "
-                f"{most}"
+                f"pucks: {self.pucks} do not fit side by side; expected at most {most}"
             )
 
     @property
     @abstractmethod
     def lineup(self) -> tuple[tuple[int, float], ...]:
-        """Side, 0 or 2, and y at the start (m) of each seat."""
+        """Side, 0 or 2, and y at the start, m, of each seat."""
 
     @cached_property
     def scene(self) -> Scene:
@@ -109,7 +108,7 @@ class Versus(Scenario):
         lying = rewards.lying(t, held)
         scored = 1.0 * far - 1.0 * home
         fouled = 1.0 * foul[..., 0, :] - 1.0 * foul[..., -1, :]
-        # A goal counts before a foul that is called in the same step.
+        # A goal has priority over a foul in the same step.
         toward = np.where(scored != 0.0, scored, fouled)
         again = (toward == 0.0) & ((lying >= 1.0 - 1e-9) | t.after.lifted)
         # Between two paddles on the middle line both clocks run at the same time.
@@ -139,11 +138,12 @@ class Versus(Scenario):
         )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        goal: ``scored_weight`` for each goal of its team, -1 for each of the other's.
-        shot: ``shot_weight`` for each shot on goal of its team that was stopped, and
-        minus that for each of the other's.
+        goal: ``scored_weight`` for each goal of the own team, -1 for each goal of the
+        other team.
+        shot: ``shot_weight`` for each stopped shot on goal of the own team, and
+        ``-shot_weight`` for each stopped shot of the other team.
         """
         scored = t.new_memory["goals"] - t.memory["goals"]
         goal = self.scored_weight * scored - scored[..., ::-1]
@@ -155,9 +155,10 @@ class Versus(Scenario):
         return terms
 
     def _leads(self, memory: Memory) -> Array:
-        """(..., 2) bool: the team has more goals or, as many, more shots on goal.
+        """Return True (..., 2) for the team with more goals.
 
-        At most one of both does.
+        If goals are equal, the team with more stopped shots on goal leads. At most one
+        team leads.
         """
         goals, stopped = memory["goals"], memory["stopped"]
         level = goals == goals[..., ::-1]
@@ -182,20 +183,20 @@ class Versus(Scenario):
         return state, memory
 
     def scores(self, memory: Memory) -> dict[str, Array]:
-        """Return goals, and shots on goal that were stopped, by team."""
+        """Return the goals and the stopped shots on goal, by team."""
         return {"goals": memory["goals"], "shots": memory["stopped"]}
 
     def decided_by(self, memory: Memory) -> str:
-        """Return "goals", or "shots on goal" in a level game; "" if both are level."""
+        """Return "goals", "shots on goal" for equal goals, or "" if both are equal."""
         for name, rule in (("goals", "goals"), ("stopped", "shots on goal")):
             if memory[name][0] != memory[name][1]:
                 return rule
         return ""
 
     def success(self, t: Transition) -> Array:
-        """(..., seats) bool: the team leads when goals or the clock end the game.
+        """(..., seats) bool: The team leads at the end of the game.
 
-        It has more goals or, of as many, more shots on goal.
+        It has more goals, or equal goals and more stopped shots on goal.
         """
         over = self.terminated(t) | t.time_limit_reached
         return np.asarray(

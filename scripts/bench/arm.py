@@ -1,10 +1,15 @@
-"""Speed of the arm: control steps per CPU-second, cases measured in rounds.
+"""Measure the speed of the arm: control steps per CPU-second, in rounds.
 
     python scripts/bench/arm.py --rounds 5
 
-Cases: robosuite's own Lift with a UR5e; our environment stepped by robosuite; the same
-model in the compiled steps of `backend="robosuite"`; ours with one arm and with two.
-All at 20 Hz; Lift at robosuite's own time step of 2 ms, ours at 1 ms and at 2 ms.
+The cases are:
+
+* robosuite's own Lift with a UR5e,
+* our environment stepped by robosuite, with one arm and with two,
+* the same models in the compiled steps of `backend="robosuite"`.
+
+All have 20 control steps per second. Lift has robosuite's own time step of 2 ms. Our
+environments have time steps of 1 ms and of 2 ms.
 """
 
 from __future__ import annotations
@@ -26,18 +31,18 @@ from marl_airhockey.sim.core.seat import make_seat
 from marl_airhockey.sim.core.table import TABLES
 
 Step = Callable[[], object]
-"""Function that makes one control step"""
+"""Function that makes one control step."""
 
 
 def make_scene(arms: int) -> Scene:
-    """Return a scene of a puck and one arm, or two."""
+    """Return a scene with a puck and one or two arms."""
     table = TABLES["standard"]
     seats = tuple(make_seat("robot", table, side) for side in (0, 2)[:arms])
     return Scene(table, seats, pucks=1)
 
 
 def lift() -> Step:
-    """Return the step of robosuite's Lift."""
+    """Return a function that steps robosuite's Lift."""
     import robosuite
 
     env = robosuite.make(
@@ -57,7 +62,7 @@ def lift() -> Step:
 
 
 def stepped_by_robosuite(arms: int, timestep: float) -> Step:
-    """Return the step of our environment as robosuite makes it."""
+    """Return a function that steps our environment by robosuite."""
     from marl_airhockey.sim.backends.robosuite.env import AirHockey
 
     env: Any = AirHockey(scene=make_scene(arms), timestep=timestep)
@@ -67,7 +72,7 @@ def stepped_by_robosuite(arms: int, timestep: float) -> Step:
 
 
 def compiled(arms: int, timestep: float) -> Step:
-    """Return the backend's compiled step, without the limits of the world."""
+    """Return a function that makes the compiled step of the backend, without limits."""
     scene = make_scene(arms)
     backend = find_backend("robosuite")(scene, 1, 0.05, round(0.05 / timestep))
     state = scene.still_state(1)
@@ -86,9 +91,9 @@ def compiled(arms: int, timestep: float) -> Step:
 
 
 def main(
-    rounds: Annotated[int, typer.Option(help="Rounds.")] = 5,
+    rounds: Annotated[int, typer.Option(help="Number of rounds.")] = 5,
     seconds: Annotated[
-        float, typer.Option(help="CPU-seconds of a case in a round.")
+        float, typer.Option(help="CPU-seconds of each case in a round.")
     ] = 2.0,
 ) -> None:
     """Measure all cases and print a table."""

@@ -1,11 +1,11 @@
-"""Training throughput of the engines, measured in rounds.
+"""Measure the training throughput of the engines, in rounds.
 
     python scripts/bench/engines.py --rounds 3
 
-Needs an environment with Ray: `make test-distributed` sets one up, and
-`.venv-distributed/bin/python` is its interpreter. A row is one trainer after its
-first iteration: steps of single seats per second of wall time and per CPU-second of
-all its processes, mean and range over the rounds.
+The script needs an environment with Ray. `make test-distributed` creates one, and
+`.venv-distributed/bin/python` is its interpreter. A row is one trainer after its first
+iteration. It has the steps of single seats per second of wall time and per CPU-second
+of all its processes, as the mean and the range over the rounds.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from marl_airhockey.sim.core.errors import require
 
 
 class Iteration(NamedTuple):
-    """Steps and time, s, of an iteration of training."""
+    """Steps and times, s, of an iteration of training."""
 
     steps: int
     wall: float
@@ -39,7 +39,7 @@ class Iteration(NamedTuple):
 
 
 def timed(work: Callable[[], tuple[int, float]]) -> Iteration:
-    """Time a function that returns its steps and the CPU time of other processes."""
+    """Time a function that returns its steps and the CPU time of other processes, s."""
     wall, cpu = time.perf_counter(), time.process_time()
     steps, elsewhere = work()
     spent = time.process_time() - cpu + elsewhere
@@ -81,9 +81,11 @@ def rllib(
 
 def main(
     scenario: Annotated[str, typer.Option(help="Scenario to train.")] = "duel",
-    worlds: Annotated[int, typer.Option(help="Worlds of each trainer.")] = 1024,
-    rounds: Annotated[int, typer.Option(help="Rounds.")] = 3,
-    runners: Annotated[int, typer.Option(help="Most env runners.")] = 2,
+    worlds: Annotated[
+        int, typer.Option(help="Number of worlds of each trainer.")
+    ] = 1024,
+    rounds: Annotated[int, typer.Option(help="Number of rounds.")] = 3,
+    runners: Annotated[int, typer.Option(help="Largest number of env runners.")] = 2,
 ) -> None:
     """Measure all trainers and print a table."""
     require("ray", "distributed")

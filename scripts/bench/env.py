@@ -1,18 +1,22 @@
-"""Env-steps and agent-steps per CPU-second, in rounds with others in one run.
+"""Compare the speed of environments with other libraries, in rounds of one run.
 
     python scripts/bench/env.py --rounds 5 --seconds 2 \
         --vmas X/bin/python --jaxmarl Y/bin/python
 
-One world at a time: our dict environment, a bare loop of pymunk's own step over the
-very same world (paddle velocities set, pucks put back as often as episodes restart),
-PettingZoo's multiwalker (pip install box2d) and mpe2's simple_tag. Many at a time: our
-arrays, and VMAS and JaxMARL, each in an interpreter of its own that works only in its
-rounds, on one thread as ours does. Their scenarios have four agents, so they are
-compared with our doubles. Actions are drawn beforehand; resets are included.
-VMAS has no automatic reset: its worlds are reset all together every 100 steps, which
-costs it least. Rates are per CPU-second of the process that steps, which a busy machine
-disturbs less than wall time. A rate is the median over the rounds, a ratio is that of
-two such rates; beside it stands how far it goes from round to round.
+Single worlds are our PettingZoo environment, PettingZoo's multiwalker (pip install
+box2d), mpe2's simple_tag, and a bare loop of pymunk's own step. The bare loop has the
+same world: paddle velocities are set, and pucks are put back as often as episodes
+restart.
+
+Batches are our arrays, VMAS and JaxMARL. The last two run in separate interpreters that
+only work in their rounds, on one thread like ours. Their scenarios have four agents, so
+they are compared with our doubles.
+
+Actions are sampled in advance, and resets are included. VMAS has no automatic reset.
+All its worlds are reset together every 100 steps, which is its cheapest option. Rates
+are per CPU-second of the process that steps, because a busy machine affects CPU time
+less than wall time. A rate is the median over the rounds, and a ratio is that of two
+medians. The table also has the spread and the range of the ratio over the rounds.
 """
 
 from __future__ import annotations
@@ -40,16 +44,17 @@ import marl_airhockey as ah
 from marl_airhockey.sim.backends.pymunk.backend import PymunkBackend
 
 Play = Callable[[], int]
-"""Steps for a moment and says how many env-steps that were."""
+"""Function that makes some steps and returns the number of environment steps."""
 Made = tuple[Play, int]
-"""An environment: what steps it, and its agents."""
+"""Function that steps an environment, and the number of agents."""
 MeasureRound = Callable[[float], dict[str, float]]
-"""Steps for so many CPU-seconds and says steps, agents and the CPU-seconds."""
+"""Function that steps for some CPU-seconds and returns steps, agents and
+CPU-seconds."""
 CHUNK = 512
-"""Steps of one world between two looks at the clock."""
+"""Number of steps of one world between two readings of the clock."""
 PYMUNK_WORLDS, WORLDS = 256, 4096
 ONE, MANY, FOUR = "env-steps", "agent-steps", "agent-steps of four agents"
-"""What is compared: one world, many worlds, many worlds of four agents"""
+"""Units of comparison: one world, many worlds, many worlds of four agents."""
 ONE_THREAD = {
     "JAX_PLATFORMS": "cpu",
     "OMP_NUM_THREADS": "1",
@@ -61,12 +66,12 @@ FOOTBALL = {
     "ai_red_agents": False,
     "ai_blue_agents": False,
 }
-VMAS_HELP = "Its python: python -m venv X && X/bin/pip install torch vmas."
-JAX_HELP = "Its python: python -m venv Y && Y/bin/pip install jaxmarl."
+VMAS_HELP = "Interpreter with VMAS: python -m venv X && X/bin/pip install torch vmas."
+JAX_HELP = "Interpreter with JaxMARL: python -m venv Y && Y/bin/pip install jaxmarl."
 
 
 def parallel(env: Any) -> Made:
-    """Any PettingZoo ParallelEnv with random actions."""
+    """Return any PettingZoo ParallelEnv with random actions."""
     env.reset(seed=0)
     rng = np.random.default_rng(0)
     agents = list(env.possible_agents)
@@ -94,12 +99,12 @@ def parallel(env: Any) -> Made:
 
 
 def ours(scenario: str, backend: str) -> Made:
-    """Return the PettingZoo environment of a scenario, ready to be stepped."""
+    """Return the PettingZoo environment of a scenario."""
     return parallel(ah.parallel_env(scenario, backend=backend))
 
 
 def bare(scenario: str) -> Made:
-    """Chipmunk's step alone over the world of our environment."""
+    """Return Chipmunk's own step over the world of our environment."""
     env = ah.parallel_env(scenario, backend="pymunk")
     env.reset(seed=0)
     backend = env.world.backend
@@ -126,7 +131,7 @@ def bare(scenario: str) -> Made:
 
 
 def worlds(scenario: str, backend: str, number: int) -> Made:
-    """Our arrays over many worlds at once, restarts included."""
+    """Return our arrays over many worlds, including restarts."""
     world = ah.make_world(scenario, number, backend=backend)
     world.reset(0)
     drawn = np.random.default_rng(0).uniform(-1, 1, (64, number, len(world.open), 2))
@@ -142,21 +147,21 @@ def worlds(scenario: str, backend: str, number: int) -> Made:
 
 
 def multiwalker() -> Made:
-    """PettingZoo's multiwalker: three walkers on Box2D."""
+    """Return PettingZoo's multiwalker: three walkers on Box2D."""
     from pettingzoo.sisl import multiwalker_v9
 
     return parallel(multiwalker_v9.parallel_env())
 
 
 def simple_tag() -> Made:
-    """mpe2's simple_tag: four agents, numpy."""
+    """Return mpe2's simple_tag: four agents, NumPy."""
     from mpe2 import simple_tag_v3
 
     return parallel(simple_tag_v3.parallel_env())
 
 
 def vmas(scenario: str, number: int, options: dict[str, Any]) -> Made:
-    """VMAS; runs in an interpreter that has it."""
+    """Return an environment of VMAS; it runs in an interpreter that has VMAS."""
     torch = import_module("torch")
     torch.set_num_threads(1)
     make = import_module("vmas").make_env
@@ -180,9 +185,10 @@ def vmas(scenario: str, number: int, options: dict[str, Any]) -> Made:
 
 
 def jaxmarl(scenario: str, number: int, length: int) -> Made:
-    """JaxMARL, scanned over so many steps a call; runs in an interpreter that has it.
+    """Return an environment of JaxMARL, which scans a number of steps per call.
 
-    Observations, rewards and dones are carried, so that no compiler leaves them out.
+    It runs in an interpreter that has JaxMARL. Observations, rewards and dones are
+    carried, so that the compiler cannot remove them.
     """
     jax = import_module("jax")
     env = import_module("jaxmarl").make(scenario)
@@ -210,7 +216,7 @@ def jaxmarl(scenario: str, number: int, length: int) -> Made:
 
 
 def clocked(play: Play, agents: int, seconds: float) -> dict[str, float]:
-    """Measure a round by this process's CPU clock; never without a step."""
+    """Measure a round by the CPU clock of this process; it has at least one step."""
     began = time.process_time()
     steps = play()
     while (spent := time.process_time() - began) < seconds:
@@ -219,9 +225,9 @@ def clocked(play: Play, agents: int, seconds: float) -> dict[str, float]:
 
 
 def serve(make: Callable[..., Made], *args: Any) -> None:
-    """Answer each line of seconds by a round's line of JSON: the side of a peer."""
+    """Answer each line of seconds by a line of JSON; a peer process runs this."""
     with open(os.dup(1), "w") as answers:
-        os.dup2(2, 1)  # what a peer itself prints is no answer
+        os.dup2(2, 1)  # Output that the library prints is not an answer.
         play, agents = make(*args)
         for line in sys.stdin:
             found = clocked(play, agents, float(line))
@@ -231,7 +237,7 @@ def serve(make: Callable[..., Made], *args: Any) -> None:
 def peer(
     stack: ExitStack, python: Path, make: Callable[..., Made], *args: Any
 ) -> MeasureRound:
-    """Start an environment in another interpreter, by the source of what it needs."""
+    """Start an environment in another interpreter, from the source of its functions."""
     program = "\n".join(
         (
             "from __future__ import annotations",
@@ -267,12 +273,12 @@ def peer(
 
 @dataclass
 class Row:
-    """Environment that is measured, warmed up when made, and its rounds."""
+    """Environment that is measured, and its rounds; it is warmed up when created."""
 
     name: str
     measure_round: MeasureRound
     unit: str
-    """What is compared, `ONE`, `MANY` or `FOUR`"""
+    """Unit of comparison: `ONE`, `MANY` or `FOUR`."""
     found: list[dict[str, float]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -284,7 +290,7 @@ class Row:
         return int(self.found[0]["agents"])
 
     def rates(self, unit: str) -> np.ndarray:
-        """Per CPU-second, a number for each round."""
+        """Return the rates per CPU-second, one for each round."""
         rates = np.array(
             [
                 measure_round["steps"] / measure_round["cpu"]
@@ -294,7 +300,7 @@ class Row:
         return rates if unit == ONE else rates * self.agents
 
     def to_json(self, mine: Row) -> dict[str, Any]:
-        """Medians, and how many times faster ours is."""
+        """Return the medians, and the ratio of our speed to this one."""
         steps = self.rates(ONE)
         these, others = mine.rates(self.unit), self.rates(self.unit)
         ratio = these / others
@@ -319,14 +325,16 @@ def rows(
     jax_python: Path | None,
     number: int,
 ) -> list[Row]:
-    """All that can be measured here; the first of each unit is what others compare to.
+    """Return everything that can be measured, in groups of the same unit.
+
+    The others of a group are compared with its first row.
 
     Args:
-        stack: ends the peers' interpreters.
-        scenario: ours.
-        vmas_python: an interpreter that has VMAS.
-        jax_python: an interpreter that has JaxMARL.
-        number: worlds of VMAS and JaxMARL.
+        stack: Stack that ends the interpreters of the other libraries.
+        scenario: Our scenario.
+        vmas_python: Interpreter that has VMAS.
+        jax_python: Interpreter that has JaxMARL.
+        number: Number of worlds of VMAS and JaxMARL.
     """
     out = []
     many = f"ours, {WORLDS} worlds, numba"
@@ -346,7 +354,7 @@ def rows(
         try:
             out.append(Row(name, partial(clocked, *make()), unit))
         except ImportError as error:
-            print(f"{name}: left out ({error})", file=sys.stderr)
+            print(f"{name}: skipped ({error})", file=sys.stderr)
     away: list[tuple[str, Path | None, Callable[..., Made], str, Any]] = [
         ("VMAS football", vmas_python, vmas, "football", FOOTBALL),
         ("VMAS simple_tag", vmas_python, vmas, "simple_tag", {}),
@@ -385,17 +393,21 @@ Python = partial(typer.Option, exists=True, dir_okay=False)
 
 
 def main(
-    scenario: Annotated[str, typer.Option(help="Ours.")] = "juggle",
-    rounds: Annotated[int, typer.Option(help="Turns.", min=1)] = 5,
-    seconds: Annotated[float, typer.Option(help="CPU-seconds a round.")] = 2.0,
+    scenario: Annotated[
+        str, typer.Option(help="Scenario of our environments.")
+    ] = "juggle",
+    rounds: Annotated[int, typer.Option(help="Number of rounds.", min=1)] = 5,
+    seconds: Annotated[
+        float, typer.Option(help="CPU-seconds of each case in a round.")
+    ] = 2.0,
     vmas_python: Annotated[Path | None, Python("--vmas", help=VMAS_HELP)] = None,
     jax_python: Annotated[Path | None, Python("--jaxmarl", help=JAX_HELP)] = None,
     peer_worlds: Annotated[
-        int, typer.Option(help="Of VMAS and JaxMARL, each.", min=1)
+        int, typer.Option(help="Number of worlds of VMAS and of JaxMARL.", min=1)
     ] = 1024,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Run all in rounds and print rates and ratios."""
+    """Measure everything in rounds and print rates and ratios."""
     with ExitStack() as stack:
         measured = rows(stack, scenario, vmas_python, jax_python, peer_worlds)
         for _ in range(rounds):

@@ -2,17 +2,17 @@
 
     python scripts/bench/lab_latency.py --out docs/data/lab_latency.csv
 
-The whole pipeline runs in real time: camera, vision, filter, policy, driver, emulated
-controller. Three times are measured and compared with those that the profile `ur5e`
-assumes:
+The whole pipeline runs in real time: camera, vision, filter, policy, robot client and
+emulated controller. Three times are measured and compared with those of the profile
+`ur5e`:
 
-* sensing: the age of the newest frame with the puck when a decision begins, from the
-  middle of its exposure, while the learned juggler plays;
-* paddle: from the start of the step with a new command until the true paddle has made
-  half of the change of velocity, between rest and half of the top speed;
-* answer: the sum, from every age and every answer.
+* sensing: age of the newest frame with the puck when a decision begins, from the middle
+  of its exposure, while a trained policy juggles;
+* paddle: time from the start of the step with a new command until the true paddle has
+  made half of the change of velocity, between rest and half of the top speed;
+* answer: the sum of both, for all pairs of an age and a time of the paddle.
 
-It takes about two minutes; nothing else should run meanwhile.
+It takes about two minutes. Nothing else should run at the same time.
 """
 
 from __future__ import annotations
@@ -36,13 +36,14 @@ from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
 
 STEPS, CHANGES, PAUSE = 400, 40, 8
-"""Control steps of the juggler; changes of the command, and steps between them"""
+"""Control steps of the juggling policy; changes of the command, and steps between
+them."""
 COMMANDS = (0.5, 0.0, -0.5, 0.0)
-"""Commanded velocities along y, as shares of the top speed, again and again"""
+"""Commanded velocities along y, divided by the top speed, which are repeated."""
 DATA = Path(__file__).parents[2] / "docs" / "data"
-"""Folder of the committed rows"""
+"""Folder of the committed rows."""
 QUANTILES = (0.05, 0.5, 0.95)
-"""Quantiles that are reported"""
+"""Quantiles that are reported."""
 
 
 def ages_of(keywords: Keywords) -> Array:
@@ -61,10 +62,10 @@ def ages_of(keywords: Keywords) -> Array:
 
 
 class Watch(threading.Thread):
-    """Thread that notes the velocity of the true paddle.
+    """Thread that records the velocity of the true paddle.
 
     Args:
-        lab: Lab whose paddle it is.
+        lab: Lab with the paddle.
     """
 
     def __init__(self, lab: Lab) -> None:
@@ -73,14 +74,14 @@ class Watch(threading.Thread):
         self._rows: list[tuple[float, float]] = []
 
     def run(self) -> None:
-        """Note time, s, and velocity along y, m/s, until `stop`."""
+        """Record time, s, and velocity along y, m/s, until `stop` is called."""
         while self._on:
             truth = self._lab.ask({"do": "truth"})
             self._rows.append((truth["time"], truth["paddle"][4]))
             time.sleep(0.004)
 
     def stop(self) -> Array:
-        """Return the rows (n, 2) that were noted."""
+        """Return the recorded rows (n, 2)."""
         self._on = False
         self.join()
         return np.array(self._rows)
@@ -128,7 +129,7 @@ def assumed() -> dict[str, tuple[float, float]]:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--out", type=Path, help="file for the rows, CSV")
+    parser.add_argument("--out", type=Path, help="CSV file of the rows.")
     given = parser.parse_args()
     with Lab() as lab, served(lab, announce=False) as port:
         path = cache_folder() / f"latency-{port}.json"

@@ -1,12 +1,13 @@
-"""Measure how well policies do the five real tasks through the lab's camera and arm.
+"""Measure the success of policies in the five real tasks through camera and arm.
 
     python scripts/bench/lab_tasks.py --out docs/data/lab_tasks.csv
 
-Each policy of the zoo for the full-size table plays 20 episodes through camera and arm,
-in real time, and 1000 on the plant alone: the same table with the same physics, but the
-true state and a paddle that follows exactly. The profile `ur5e` is the simulation that
-it was trained in. 95 % intervals. It takes about 15 minutes; nothing else should run
-meanwhile. Tasks whose rows are in the file are not measured again.
+Each policy of the zoo for the full-size table plays 20 episodes through the lab's
+camera and arm, in real time. It plays 1000 episodes on the plant alone: the same table
+with the same physics, but with the true state and a paddle that follows exactly. It
+also plays 1000 in the profile `ur5e`, the simulation that it was trained in. Intervals
+are 95 %. The script takes about 15 minutes. Nothing else should run at the same time.
+Tasks whose rows are in the file are not measured again.
 """
 
 from __future__ import annotations
@@ -24,13 +25,13 @@ from marl_airhockey.sim.sensing.simulated_camera import SENSED
 
 TASKS = ("reach", "reach_velocity", "touch", "juggle", "puck_velocity")
 EXACT = (*SENSED, "action_delay", "servo_time")
-"""Parameters that are 0 for the plant alone"""
+"""Parameters that are 0 for the plant alone."""
 EPISODES, SIMULATED = 20, 1000
-"""Episodes through the lab, and of each simulation"""
+"""Number of episodes through the lab, and of each simulation."""
 
 
 def shown(result: EvaluationResult, digits: int) -> str:
-    """Return a success with its interval."""
+    """Return a success with its interval as text."""
     low, high = result.success_interval
     return f"{result.success:.{digits}f} ({low:.{digits}f} .. {high:.{digits}f})"
 
@@ -40,8 +41,8 @@ def measure(task: str, rig: Path, physics: dict[str, float]) -> dict[str, str]:
 
     Args:
         task: Name of the task.
-        rig: File of the lab's rig.
-        physics: Parameters of the lab's table.
+        rig: File of the rig of the lab.
+        physics: Physics parameters of the table of the lab.
     """
     policy, options = f"zoo/{task}_full_size", {"table": "full_size"}
     lab = evaluate(policy, task, episodes=EPISODES, backend="real", rig=str(rig))
@@ -68,7 +69,7 @@ def measure(task: str, rig: Path, physics: dict[str, float]) -> dict[str, str]:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--out", type=Path, required=True, help="file of the rows, CSV")
+    parser.add_argument("--out", type=Path, required=True, help="CSV file of the rows.")
     out = parser.parse_args().out
     rows: list[dict[str, str]] = []
     if out.exists():

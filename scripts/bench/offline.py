@@ -1,10 +1,11 @@
-"""Cost of a gradient step of IQL, ours and TorchRL's, measured in turns.
+"""Compare the cost of a gradient step of IQL with TorchRL, in turns.
 
     python scripts/bench/offline.py --rounds 5 --steps 500
 
-Both have networks of 256 x 256 and batches of 256 steps of the same recording, one
-thread, and Adam for all; both sample a batch, descend, and move their targets. Printed
-are milliseconds of CPU time a step, the median of the rounds, and their ratio.
+Both have networks of 256 x 256 units, batches of 256 steps of the same recording, one
+thread, and Adam for all networks. Both sample a batch, make a gradient step and move
+their targets. The script prints the CPU time of a step in ms, the median of the rounds,
+and the ratio.
 """
 
 from __future__ import annotations
@@ -38,13 +39,13 @@ BATCH = 256
 
 
 def make_ours(recording: Path, folder: Path) -> Callable[[int], object]:
-    """Return our step."""
+    """Return a function that makes our gradient step."""
     config = offline_config("iql", [recording], {"hidden": HIDDEN})
     return Learner(TrainingRun(config, folder)).descend
 
 
 def make_theirs(steps: StepBatch) -> Callable[[int], object]:
-    """Return TorchRL's step."""
+    """Return a function that makes TorchRL's gradient step."""
     size = steps.observation.shape[1]
     network = nn.Sequential(MLP(size, 4, num_cells=HIDDEN), NormalParamExtractor())
     keys = ["loc", "scale"]
@@ -102,8 +103,10 @@ def cost_of(step: Callable[[int], object], count: int) -> float:
 
 
 def main(
-    rounds: Annotated[int, typer.Option(help="Number of turns.")] = 5,
-    steps: Annotated[int, typer.Option(help="Gradient steps in a turn.")] = 500,
+    rounds: Annotated[int, typer.Option(help="Number of rounds.")] = 5,
+    steps: Annotated[
+        int, typer.Option(help="Number of gradient steps in a round.")
+    ] = 500,
 ) -> None:
     """Measure and print."""
     torch.set_num_threads(1)

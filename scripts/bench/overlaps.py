@@ -1,10 +1,10 @@
-"""Deepest overlap of many blocks that slide into a heap, on physics alone.
+"""Measure the deepest overlap of many blocks that slide into a heap, on physics alone.
 
     python scripts/bench/overlaps.py --blocks 15,20,30
 
-A paddle that is pushed about, a puck and blocks are on a table of 20 degrees. Printed
-are the deepest overlap of two discs, or of one with a wall, at the end of any step, and
-world-steps per CPU-second.
+A paddle with random velocities, a puck and blocks are on a table that is tilted by 20
+degrees. The script prints the deepest overlap of two discs, or of a disc with a wall,
+at the end of any step, and the world-steps per CPU-second.
 """
 
 from __future__ import annotations
@@ -24,13 +24,14 @@ from marl_airhockey.sim.core.seat import make_seat
 from marl_airhockey.sim.core.table import TABLES
 
 WORLDS, REVERSAL = 8, 4
-"""Number of worlds; steps for which a paddle keeps its velocity"""
+"""Number of worlds, and number of steps for which a paddle has the same velocity."""
 TOP, SPREAD = 1.5, 0.5
-"""Largest speeds of a paddle, and of the others at first, along an axis, m/s"""
+"""Largest speed of a paddle, and largest initial speed of the others, along an axis,
+m/s."""
 
 
 def play(blocks: int, seed: int, steps: int) -> tuple[float, float]:
-    """Return the deepest overlap, m, and CPU-seconds of some steps."""
+    """Return the deepest overlap, m, and the CPU-seconds of some steps."""
     table = TABLES["full_size"]
     seats = (make_seat("arcade", table, side=0),)
     scene = Scene(table, seats, pucks=1, blocks=blocks, block_radius=0.0277)
@@ -58,9 +59,13 @@ def play(blocks: int, seed: int, steps: int) -> tuple[float, float]:
 
 
 def main(
-    blocks: Annotated[str, typer.Option(help="Comma-separated.")] = "15,20,30",
-    seeds: Annotated[int, typer.Option(help="Heaps of each.")] = 2,
-    steps: Annotated[int, typer.Option(help="Steps of each.")] = 2400,
+    blocks: Annotated[
+        str, typer.Option(help="Numbers of blocks, separated by commas.")
+    ] = "15,20,30",
+    seeds: Annotated[
+        int, typer.Option(help="Number of heaps of each number of blocks.")
+    ] = 2,
+    steps: Annotated[int, typer.Option(help="Number of steps of each heap.")] = 2400,
 ) -> None:
     """Measure each number of blocks."""
     for count in map(int, blocks.split(",")):

@@ -1,13 +1,18 @@
-"""Benchmark of the page: how soon a moved pointer is seen, in headless Chromium.
+"""Measure the latency of the page from a pointer event to the image, in Chromium.
 
     python scripts/bench/play.py --seconds 20
 
-Three cases: one player against a policy; two players and watchers (connections that
-take every frame as a page does); one player beside connections that never end their
-request, opened again as the server drops them. For each: the time from a pointer event
-to the picture that shows the server's answer, frames of state per second, the server's
-loop rate and its share of a core. Browser, watchers and server share the machine's
-cores, whose load is printed.
+There are three cases:
+
+* one player against a policy;
+* two players and watchers, which are connections that receive every frame like a page;
+* one player, and connections that never finish their request and are opened again when
+  the server closes them.
+
+For each case the script prints the time from a pointer event to the image that shows
+the server's answer, the frames of state per second, the rate of the server's loop and
+its share of a core. Browser (headless), watchers and server share the cores of the
+machine. Their load is also printed.
 """
 
 from __future__ import annotations
@@ -37,8 +42,9 @@ from rich.table import Table
 
 ARGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 POINTER_RATE = 60
-"""Pointer events per second and player, at moments drawn at random: browser, server and
-pointer run at nearly the same rate, and one would measure their phases."""
+"""Pointer events per second and player, at random times. Browser, server and pointer
+run at nearly the same rate, so regular events would measure the differences of their
+phases."""
 
 
 def serve(*options: str) -> tuple[str, subprocess.Popen[str]]:
@@ -61,7 +67,7 @@ def cpu(pid: int) -> float:
 
 
 class Watchers:
-    """Connections that take every frame, in a thread of their own."""
+    """Connections that receive every frame, in a separate thread."""
 
     def __init__(self, address: str, count: int) -> None:
         self._address = address.replace("http", "ws") + "ws"
@@ -79,12 +85,13 @@ class Watchers:
             with contextlib.suppress(websockets.ConnectionClosed):
                 while True:
                     data = json.loads(await connection.recv())
-                    if data["t"] == "state" and data["f"] % 3 == 0:  # As a page does.
+                    # A page does the same.
+                    if data["t"] == "state" and data["f"] % 3 == 0:
                         await connection.send(json.dumps({"t": "seen", "f": data["f"]}))
 
 
 class HalfOpen:
-    """Connections that never end their request, in a thread of their own."""
+    """Connections that never finish their request, in a separate thread."""
 
     def __init__(self, address: str, count: int) -> None:
         host, port = address.removeprefix("http://").rstrip("/").split(":")
@@ -127,7 +134,7 @@ def seated(browser: Browser, address: str) -> Page:
 
 
 def measure(pages: list[Page], pid: int, seconds: float) -> list[str]:
-    """Move the pointers of all pages for a while; return a row of the table."""
+    """Move the pointers of all pages for some seconds; return a row of the table."""
     boxes = []
     for page in pages:
         box = page.locator("#table").bounding_box()
@@ -171,14 +178,18 @@ def measure(pages: list[Page], pid: int, seconds: float) -> list[str]:
 
 
 def main(
-    seconds: Annotated[float, typer.Option(help="Of each case.")] = 20.0,
-    watchers: Annotated[int, typer.Option(help="In the second case.")] = 20,
-    half_open: Annotated[int, typer.Option(help="In the third case.")] = 1050,
+    seconds: Annotated[float, typer.Option(help="Duration of each case, s.")] = 20.0,
+    watchers: Annotated[
+        int, typer.Option(help="Number of watchers in the second case.")
+    ] = 20,
+    half_open: Annotated[
+        int, typer.Option(help="Number of unfinished connections in the third case.")
+    ] = 1050,
 ) -> None:
     """Measure and print."""
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
-        raise SystemExit("there is no Chromium here: apt-get install chromium")
+        raise SystemExit("Chromium is not installed: apt-get install chromium")
     table = Table(
         "case", "p50 ms", "p99 ms", "events", "frames/s", "loop Hz", "server", "load"
     )
@@ -191,7 +202,7 @@ def main(
     with sync_playwright() as playwright:
         for name, options, players, crowd, idle in cases:
             address, process = serve(*options)
-            # A browser each: a page that lies behind another is drawn less often.
+            # Each player has a browser, because hidden pages are updated less often.
             browsers = [
                 playwright.chromium.launch(executable_path=chromium, args=ARGS)
                 for _ in range(players)

@@ -1,13 +1,19 @@
-"""Compare where real pucks were after 0.1 .. 1 s with where the laws send them.
+"""Compare measured positions of pucks after 0.1 .. 1 s with predicted ones.
 
     python scripts/bench/prediction.py --data starts.npz
 
-The file holds states that were measured in play, in a frame whose axes begin in a
-corner: ``table`` (N,) name, ``source`` (N,) file that a state comes from, ``p0`` and
-``v0`` (N, 2) in m and m/s, ``romega`` (N,) radius times spin (counter-clockwise), m/s,
-``target`` (N, 4, 4) with x, y, -, number of banks after 0.1, 0.25, 0.5, 1 s, nan where
-unknown, and ``planes`` (tables, 4): x and y between which the puck's centre turns, for
-the tables in alphabetical order. Errors are medians and 90 % quantiles in mm.
+The file has states of real pucks that were measured in play. The frame has its origin
+in a corner of the table. Errors are medians and 90 % quantiles in mm. The arrays of the
+file are:
+
+* ``table`` (N,): name of the table,
+* ``source`` (N,): file that a state is from,
+* ``p0`` and ``v0`` (N, 2): position, m, and velocity, m/s,
+* ``romega`` (N,): radius times spin, counter-clockwise, m/s,
+* ``target`` (N, 4, 4): x, y, an unused value and the number of wall bounces after 0.1,
+  0.25, 0.5 and 1 s; nan where it is unknown,
+* ``planes`` (tables, 4): ends of x and of y of the puck's centre, for the tables in
+  alphabetical order.
 """
 
 from __future__ import annotations
@@ -35,25 +41,26 @@ DT = 0.05
 PUCKS = {"pro": 0.0413, "wood": 0.03145}
 """Radii of the pucks, m."""
 USUAL = {"pro": "professional", "wood": "wooden"}
-"""Preset that belongs to each table."""
+"""Preset of each table."""
 OLD = {
     **{"wall_restitution_slope": 0.0, "wall_friction": 0.0, "puck_drag": 0.0},
     **{"puck_damping": 0.15, "wall_restitution": 0.9, "tilt": 0.0},
 }
-"""Laws of before: linear drag, constant restitution, no friction and no spin."""
+"""Simple model: linear drag, constant restitution, no friction and no spin."""
 BEST = {
     "pro": {"puck_damping": 0.049, "wall_restitution": 0.836},
     "wood": {"puck_damping": 0.137, "wall_restitution": 0.625},
 }
-"""Constants with which the laws of before predict best."""
+"""Constants with which the simple model predicts best."""
 FITTED = (
     *("puck_drag", "wall_restitution", "wall_restitution_slope", "wall_friction"),
     *("tilt", "cross_tilt"),
 )
 SCALES = (0.005, 0.03, 0.02, 0.05, 0.1, 0.1)
-"""First steps of the search for each of `FITTED`."""
+"""Initial steps of the search for each of `FITTED`."""
 MAX_ERROR = 0.1
-"""Largest error that counts in a fit, m: after an unseen hit it may be anything."""
+"""Largest error that counts in a fit, m. After an unobserved contact errors have no
+bound."""
 
 Errors = dict[str, dict[str, dict[str, float]]]
 
@@ -67,7 +74,7 @@ class Starts:
     position: Array
     velocity: Array
     edge: Array
-    """Radius times spin (N,), m/s"""
+    """Radius times spin, m/s, (N,)."""
     target: Array
     planes: Array
 
@@ -104,10 +111,10 @@ class Starts:
 
 
 class Predictor:
-    """Simulation of all states of a table at once, one world for each.
+    """Simulation of all states of a table in one batch, with one world for each state.
 
     Args:
-        starts: measured states.
+        starts: Measured states.
     """
 
     def __init__(self, starts: Starts) -> None:
@@ -120,7 +127,12 @@ class Predictor:
         self._backend = find_backend("numba")(self._scene, self._worlds, DT)
 
     def errors(self, physics: Given, spins: bool = True) -> Array:
-        """Return (N, horizons) distances from where the pucks were, m."""
+        """Return the distances from the measured positions, m, (N, horizons).
+
+        Args:
+            physics: Physics parameters.
+            spins: True to begin with the measured spin, False to begin without spin.
+        """
         values = {
             n: v for n, (v, _) in Physics({"tilt": 0.0}, given=physics).ranges.items()
         }
@@ -160,7 +172,7 @@ def summarise(starts: Starts, errors: Array) -> Errors:
 
 
 def fit(starts: Starts) -> dict[str, float]:
-    """Return the physics that predict some states best."""
+    """Return the physics parameters that predict some states best."""
     from scipy.optimize import minimize
 
     predictor = Predictor(starts)
@@ -194,17 +206,19 @@ def cross_validated(starts: Starts) -> Array:
 
 
 def main(
-    data: Annotated[Path, typer.Option(help="Measured states, .npz; see above.")],
+    data: Annotated[Path, typer.Option(help="File of measured states, .npz.")],
     physics: Annotated[
         str | None,
-        typer.Option(help="A preset or a TOML file; the table's own unless given."),
+        typer.Option(
+            help="Preset or TOML file of the physics; by default that of the table."
+        ),
     ] = None,
     fitted: Annotated[
-        bool, typer.Option("--fit", help="Fit the laws in two folds by source.")
+        bool, typer.Option("--fit", help="Fit the physics in two folds by source.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Print errors of prediction; without --json those of the laws of before, too."""
+    """Print errors of predictions, without --json also those of the simple model."""
     results: dict[str, Errors] = {}
     shown = RichTable(
         "", "kind", *(f"{h:g} s" for h in HORIZONS), title="mm, median / 90 %"
@@ -218,11 +232,11 @@ def main(
             rows = {chosen: predictor.errors(chosen)}
         results[name] = summarise(starts, next(iter(rows.values())))
         if not as_json:
-            rows["without spin at first"] = predictor.errors(
+            rows["without initial spin"] = predictor.errors(
                 physics or USUAL[name], False
             )
-            rows["before, best constants"] = predictor.errors(OLD | BEST[name])
-            rows["before, defaults"] = predictor.errors(OLD)
+            rows["simple model, best constants"] = predictor.errors(OLD | BEST[name])
+            rows["simple model, defaults"] = predictor.errors(OLD)
         for law, errors in rows.items():
             for kind, cells in summarise(starts, errors).items():
                 numbers = [cells.get(f"{h:g}", {}) for h in HORIZONS]

@@ -1,10 +1,10 @@
-"""Replay 1,000 recorded episodes of every scenario and compare what it computes.
+"""Replay 1,000 recorded episodes of every scenario and compare all columns.
 
     python scripts/bench/replay.py --episodes 1000
 
-Printed are the steps of each scenario and the largest difference of any column: states,
-memory, observations, reward terms, success, ends. Scripts play at all seats, for 160
-steps at most.
+The script prints the steps of each scenario and the largest difference of any column:
+states, memory, observations, reward terms, success and ends. Scripts play at all seats,
+for at most 160 steps.
 """
 
 from __future__ import annotations
@@ -38,8 +38,12 @@ def replayed(name: str, profile: str, episodes: int, folder: Path) -> str:
 
 
 def main(
-    episodes: Annotated[int, typer.Option(help="Episodes of each scenario.")] = 1000,
-    profiles: Annotated[str, typer.Option(help="Comma-separated.")] = "ideal",
+    episodes: Annotated[
+        int, typer.Option(help="Number of episodes of each scenario.")
+    ] = 1000,
+    profiles: Annotated[
+        str, typer.Option(help="Names of profiles, separated by commas.")
+    ] = "ideal",
 ) -> None:
     """Print the table."""
     print("| scenario | profile | steps | largest difference | CPU time, s |")

@@ -1,10 +1,11 @@
-"""Growth of the cost of a step of the numba backend, as a table and a picture.
+"""Measure the growth of the cost of a step of the numba backend: a table and a plot.
 
     python scripts/bench/scaling.py --out docs/images/scaling.png
 
-Whole env-steps of `juggle` against the number of worlds, resets included; physics
-alone, in 1024 worlds that are reset every 20 steps, against pucks, blocks and paddles.
-CPU time of this process; each case is measured once a round, medians over the rounds.
+The first case is whole environment steps of `juggle` against the number of worlds,
+including resets. The others are physics alone against the number of pucks, blocks and
+paddles, in 1024 worlds that are reset every 20 steps. Times are CPU time of this
+process. Each case is measured once per round, and values are medians over the rounds.
 """
 
 from __future__ import annotations
@@ -30,25 +31,27 @@ from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
 
 Steps = Callable[[], tuple[float, int]]
-"""Function that steps for a moment and returns CPU-seconds and calls"""
+"""Function that makes some steps and returns the CPU-seconds and the number of
+calls."""
 WORLDS = (1, 4, 16, 64, 256, 1024, 4096, 16384, 65536)
 BATCH, EPISODE, REVERSAL = 1024, 20, 4
-"""Worlds of physics alone; steps between two resets; steps until paddles reverse"""
+"""Worlds of physics alone; steps between two resets; steps until paddles reverse."""
 ROWS = np.linspace(-0.3, 0.3, 4)
 PADDLES = [(x, y) for x in (-0.8, -0.6) for y in ROWS]
 PUCKS = [(x, y) for x in (-0.35, -0.2) for y in ROWS[[1, 2, 0, 3]]]
 BLOCKS = [(x, y) for x in np.linspace(0, 0.8, 6) for y in np.linspace(-0.25, 0.25, 5)]
-"""First positions of bodies, m, apart from each other; the first so many are used"""
+"""Initial positions of bodies, m, without contact. The first ones of each list are
+used."""
 AIM = np.pi / 6
-"""Largest angle between a puck's velocity and the direction of the blocks, rad"""
+"""Largest angle between the velocity of a puck and the direction of the blocks, rad."""
 
 
 def env_steps(worlds: int) -> Steps:
-    """Return env-steps of `juggle`: physics, rules, observations and resets."""
+    """Return environment steps of `juggle`: physics, rules, observations and resets."""
     world = ah.make_world("juggle", worlds, backend="numba")
     world.reset(0)
     actions = np.random.default_rng(0).uniform(-1, 1, (16, worlds, 1, 2))
-    for k in range(100):  # compiles, and lets episodes spread apart
+    for k in range(100):  # Compile the code and desynchronize the episodes.
         world.step(actions[k % 16])
     calls = max(16, 4096 // worlds)
 
@@ -66,7 +69,8 @@ def physics(
 ) -> Steps:
     """Return steps of physics alone on the full-size table.
 
-    Pucks move at about ``top`` m/s, up to ``spread`` rad off the blocks' direction.
+    Pucks move at about ``top`` m/s, up to ``spread`` rad off the direction of the
+    blocks.
     """
     table = TABLES["full_size"]
     seats = (make_seat("arcade", table, side=0),) * paddles
@@ -98,7 +102,7 @@ def physics(
 
 
 def seconds_per_call(step: Steps, seconds: float) -> float:
-    """Return the CPU-seconds of a call, measured for so many, one call at least."""
+    """Return the CPU-seconds of a call, over at least ``seconds`` and one call."""
     spent, calls = step()
     while spent < seconds:
         more, further = step()
@@ -107,7 +111,12 @@ def seconds_per_call(step: Steps, seconds: float) -> float:
 
 
 def plot_costs(costs: dict[tuple[str, str], dict[int, float]], out: Path) -> None:
-    """Draw a panel for each number that grows; ``costs`` in ns per step of a world."""
+    """Plot one panel for each number that grows.
+
+    Args:
+        costs: CPU time of a step of a world, ns, by number, by panel and case.
+        out: PNG file.
+    """
     figure, grid = plt.subplots(2, 2, figsize=(8.4, 6.2), dpi=DPI, layout="constrained")
     panels = dict.fromkeys(name for name, _ in costs)
     for axes, panel in zip(grid.flat, panels, strict=True):
@@ -137,13 +146,13 @@ def plot_costs(costs: dict[tuple[str, str], dict[int, float]], out: Path) -> Non
 
 
 def main(
-    rounds: Annotated[int, typer.Option(min=1, help="Rounds.")] = 7,
-    seconds: Annotated[float, typer.Option(help="CPU-seconds per point.")] = 1.0,
-    out: Annotated[Path, typer.Option(help="The picture.")] = Path(
+    rounds: Annotated[int, typer.Option(min=1, help="Number of rounds.")] = 7,
+    seconds: Annotated[float, typer.Option(help="CPU-seconds of each point.")] = 1.0,
+    out: Annotated[Path, typer.Option(help="PNG file of the plot.")] = Path(
         "docs/images/scaling.png"
     ),
 ) -> None:
-    """Measure all cases in rounds, print and draw them."""
+    """Measure all cases in rounds, print and plot them."""
     some, many = range(1, 9), range(0, 31, 5)
     cases: dict[tuple[str, str], dict[int, Steps]] = {
         ("worlds", "1 paddle, 1 puck"): {n: env_steps(n) for n in WORLDS},

@@ -2,13 +2,17 @@
 
     python scripts/bench/soak.py --hours 6 --out docs/data/soak.json
 
-The driver runs at its rate of 125 Hz in emulated time. A caller commands random
-velocities, some of them wild, 20 times a second; somebody moves the speed slider; every
-20 s or so a fault of the controller begins, and ends after a few seconds; the driver's
-process stalls now and then. An operator recovers from each FAULT, and guides an arm
-back that was carried away. Printed are the changes of the driver's state, the largest
-speed of the paddle while the driver's program moves it, and the moments in which it was
-faster than 1.02 times its limit: leaps, of which there must be none.
+The robot client runs at its rate of 125 Hz in emulated time. These events are emulated:
+
+* A caller commands random velocities 20 times per second, some of them extreme.
+* A person moves the speed slider.
+* About every 20 s a fault of the controller begins, and ends after a few seconds.
+* The process of the robot client stalls now and then.
+* An operator recovers from each FAULT and guides an arm back that was carried away.
+
+The script prints the state changes of the robot client, the largest speed of the paddle
+while the client's URScript moves it, and the number of leaps. A leap is a moment with a
+speed above 1.02 times the limit; there must be none.
 
 Six hours take about 25 minutes of one core.
 """
@@ -35,16 +39,16 @@ from marl_airhockey.sim.core.geometry import half_planes
 
 CONTROL_DT = 0.05
 OF_CONNECTIONS = ("forgotten_recipes", "late_state")
-"""Faults that only a client over the network meets"""
+"""Faults that only occur over a network."""
 NAMES = [name for name in FAULTS if name not in OF_CONNECTIONS]
 LEAP = 1.02
-"""Speed, as a multiple of the limit, above which a moment is a leap"""
+"""Speed above which a moment is a leap, divided by the limit."""
 OPERATOR = 6.0
-"""Time after which an operator recovers from a FAULT, s"""
+"""Time after which an operator recovers from a FAULT, s."""
 MOST_AWAY = 0.3
-"""Distance from home at which an arm was carried away, m"""
+"""Distance from home from which an arm is guided back, m."""
 AT_TABLE = 0.04
-"""Distance from the reach up to which a driver takes an arm as it is, m"""
+"""Distance from the workspace up to which the robot client accepts the arm, m."""
 
 
 class Soak:
@@ -69,14 +73,14 @@ class Soak:
         self.robot.enable()
 
     def _watch_cycles(self) -> None:
-        """Measure the CPU time of each cycle of the present driver."""
+        """Measure the CPU time of each cycle of the current robot client."""
         driver = self.robot.driver
         cycle = driver.cycle
 
         def timed() -> None:
             began, now = time.thread_time(), self.robot.now
             cycle()
-            # A call that waits for the controller emulates it meanwhile.
+            # A call that waits for the controller emulates it and is not counted.
             if self.robot.now == now:
                 self.longest = max(self.longest, time.thread_time() - began)
             self.cycles += 1
@@ -101,7 +105,7 @@ class Soak:
             self._operate()
 
     def _disturb(self) -> None:
-        """Switch faults, move the slider and stall the driver."""
+        """Switch faults, move the slider and stall the robot client."""
         robot, rng, now = self.robot, self.rng, self.robot.now
         if self._fault and now > self._until:
             robot.switch(self._fault, False)
@@ -132,19 +136,19 @@ class Soak:
         self.leaps += speed > LEAP * self.limit
         place = robot.true_position
         if robot.state is not DriverState.FAULT:
-            # A person may have left the arm outside; then it only has to come in.
+            # A person may leave the arm outside. Then only its return is checked.
             outside = max(self._outside(), 0.0)
             self._left_at = min(self._left_at, outside)
             self.outside = max(self.outside, outside - self._left_at)
             self.depth = max(self.depth, -float(place[2]))
 
     def _outside(self) -> float:
-        """Return how far the paddle is outside its reach, m."""
+        """Return the distance of the paddle outside of its workspace, m."""
         place = self.robot.true_position[:2]
         return -float((self.normals @ place + self.offsets).min())
 
     def _operate(self) -> None:
-        """Do what an operator does: let go of latched HOLDs, recover from FAULTs."""
+        """Act as an operator: end HOLDs that persist, and recover from FAULTs."""
         robot, now = self.robot, self.robot.now
         if robot.state is DriverState.HOLD and self.rng.random() < 0.05:
             robot.disable()
@@ -168,7 +172,7 @@ class Soak:
         robot.enable()
 
     def _guide_back(self) -> None:
-        """Lead an arm home that was carried away, as a person does."""
+        """Guide an arm home that was carried away, as a person does."""
         robot, home = self.robot, np.asarray(self.robot.setup.home)
         arm = robot.controller.arm
         away = np.linalg.norm(robot.true_position[:2] - home) > MOST_AWAY
@@ -177,7 +181,7 @@ class Soak:
             robot.advance(5.0)
 
     def row(self, hours: float) -> dict[str, object]:
-        """Return what was measured."""
+        """Return the measured values."""
         return {
             "hours": hours,
             "cycles": self.cycles,
@@ -195,9 +199,11 @@ class Soak:
 def main() -> None:
     """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--hours", type=float, default=6.0, help="emulated hours")
+    parser.add_argument(
+        "--hours", type=float, default=6.0, help="Number of emulated hours."
+    )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, help="file for the result, JSON")
+    parser.add_argument("--out", type=Path, help="JSON file of the result.")
     given = parser.parse_args()
     logging.getLogger("marl_airhockey.robot").setLevel(logging.ERROR)
     soak = Soak(given.seed)

@@ -2,17 +2,22 @@
 
     python scripts/bench/stops.py --out docs/data/stops.json
 
-A caller, in a process of its own, commands 0.5 m/s 20 times a second; the driver is
-another process, with the real client; the lab's controller is a third. Then a fault is
-switched on, or one of the processes is killed. The lab tells the truth of its paddle.
-Printed are medians and worst values over the trials: the times until the driver begins
-to brake (where it is the one that does), until the paddle is slower by a tenth, and
-until it rests (0.01 m/s), and the largest deceleration, over 10 ms. A new command, and
-commands that stop, count from the command. `stops_emulated.py` measures the same in
-emulated time, for pairs of faults, too.
+A caller commands 0.5 m/s 20 times per second. Caller, robot client (with the real
+client) and the lab's controller are separate processes. Then a fault is switched on, or
+one of the processes is killed. The lab reports the true state of its paddle. The script
+prints medians and worst values over the trials:
 
-Nothing else should run meanwhile; it takes about 35 minutes. Each case that ends is in
-the file; one that is there with as many trials is not measured again.
+* time until the robot client begins to brake, where it is the one that brakes,
+* time until the paddle is slower by a tenth,
+* time until the paddle is at rest (0.01 m/s),
+* largest deceleration, over 10 ms.
+
+For a new command, and for commands that stop, times count from the command.
+`stops_emulated.py` measures the same in emulated time, also for pairs of faults.
+
+The script takes about 35 minutes. Nothing else should run at the same time. Finished
+cases are in the file. A case that is there with the same number of trials is not
+measured again.
 """
 
 from __future__ import annotations
@@ -35,15 +40,15 @@ from marl_airhockey.hardware.robot import DriverState, Robot, RobotConfig
 from marl_airhockey.types import Array
 
 SPEED = 0.5
-"""m/s"""
+"""Commanded speed, m/s."""
 CONTROL_DT = 0.05
-"""Time between two commands, s"""
+"""Time between two commands, s."""
 LISTEN = 3.0
-"""Longest time for which the truth is listened to, s"""
+"""Longest time for which the paddle is observed, s."""
 STILL = 0.01
-"""Speed below which the paddle rests, m/s"""
+"""Speed below which the paddle is at rest, m/s."""
 ANSWER = 40.0
-"""Longest time until a caller has its paddle in motion, s"""
+"""Longest time until a caller has its paddle in motion, s."""
 UP = np.array([0.0, SPEED])
 FAULTS = (
     *("protective_stop", "emergency_stop", "silent_robot", "delayed_packets"),
@@ -57,13 +62,13 @@ class Report(NamedTuple):
     """Report of a caller."""
 
     commanded_at: float
-    """Time of the first command that was another, or of the last one, s"""
+    """Time of the first changed command, or of the last command, s."""
     braked_at: float
-    """Time at which the driver began to brake of its own, s"""
+    """Time at which the robot client began to brake by its own decision, s."""
 
 
 def run_caller(config: RobotConfig, start: Array, pipe: Connection) -> None:
-    """Command a velocity until the pipe says which other, or None for no more."""
+    """Command a velocity until the pipe sends another one; None ends the commands."""
     with Robot(config) as robot:
         while robot.state is DriverState.FAULT:
             time.sleep(5.5)
@@ -94,10 +99,10 @@ class NotMovingError(RuntimeError):
 
 
 class Trial:
-    """Trial: a paddle in motion, and the processes that move it.
+    """Trial: a moving paddle, and the processes that move it.
 
     Args:
-        lab: Lab whose arm it is.
+        lab: Lab with the arm.
     """
 
     def __init__(self, lab: Lab) -> None:
@@ -112,10 +117,11 @@ class Trial:
         self.driver_pid = self._wait()
 
     def _wait(self) -> int:
-        """Return the driver's process once the paddle moves.
+        """Return the process id of the robot client when the paddle moves.
 
         Raises:
-            NotMovingError: It does not, as when the machine is busy.
+            NotMovingError: The paddle does not move, for example because the machine is
+                busy.
         """
         try:
             if self._pipe.poll(ANSWER):
@@ -127,11 +133,11 @@ class Trial:
         raise NotMovingError("the caller's paddle does not move")
 
     def command(self, velocity: Array | None) -> None:
-        """Let the caller command another velocity (2,), m/s; None for no more."""
+        """Let the caller command another velocity (2,), m/s; None ends the commands."""
         self._pipe.send(velocity)
 
     def end(self) -> Report:
-        """End the caller and return its report; nan from a dead one."""
+        """End the caller and return its report; nan if the caller is dead."""
         try:
             self._pipe.send("end")
             report = Report(*self._pipe.recv())
@@ -142,9 +148,9 @@ class Trial:
 
 
 def listen(lab: Lab) -> Array:
-    """Return rows of time, x, y, vx, vy of the paddle, as it truly is, until it rests.
+    """Return rows of time, x, y, vx, vy of the true paddle until it is at rest.
 
-    The first 0.3 s are always there: it may begin to brake late.
+    The rows include at least the first 0.3 s, because it may begin to brake late.
     """
     rows, begin = [], time.monotonic()
     while time.monotonic() < begin + LISTEN:
@@ -157,27 +163,27 @@ def listen(lab: Lab) -> Array:
 
 
 def judge(rows: Array, since: float, braked_at: float) -> tuple[float, ...]:
-    """Return the `MEASURES`; nan for what there is not."""
+    """Return the `MEASURES`; nan for missing values."""
     speed, t = np.linalg.norm(rows[:, 3:], axis=1), rows[:, 0]
     brakes = t[(t > since) & (speed < 0.9 * SPEED)]
     rests = t[(t > since) & (speed < STILL)]
     asked = braked_at - since if braked_at > since else np.nan
     if not len(brakes) or not len(rests):
         return asked, np.nan, np.nan, np.nan
-    # Over 10 ms: the lab tells what its controller has published last.
+    # Over 10 ms, because the lab reports what its controller published last.
     fine = np.arange(since, rests[0] + 0.01, 0.01)
     slowing = -np.diff(np.interp(fine, t, speed)) / 0.01
     return asked, brakes[0] - since, rests[0] - since, float(slowing.max())
 
 
 class Bench:
-    """Bench of trials, with a lab that is opened again when its controller is dead."""
+    """Bench of trials; its lab is opened again after its controller was killed."""
 
     def __init__(self) -> None:
         self.lab = Lab()
 
     def fault(self, name: str) -> Callable[[Trial], None]:
-        """Return what switches a fault on."""
+        """Return a function that switches a fault on."""
         return lambda trial: self._switch(name, True)
 
     def _switch(self, name: str, on: bool) -> None:
@@ -197,7 +203,7 @@ class Bench:
         self.lab = Lab()
 
     def _begin(self) -> Trial:
-        """Return a trial; one that does not begin is tried once more."""
+        """Return a trial, with a second attempt if it does not begin."""
         try:
             return Trial(self.lab)
         except NotMovingError as error:
@@ -210,8 +216,8 @@ class Bench:
         """Return the `MEASURES` of one trial.
 
         Args:
-            act: Function that lets something go wrong.
-            of_command: Whether times count from the command.
+            act: Function that causes the fault.
+            of_command: True to count times from the command.
         """
         trial = self._begin()
         since = time.monotonic()
@@ -229,12 +235,12 @@ def kill_caller(trial: Trial) -> None:
 
 
 def kill_driver(trial: Trial) -> None:
-    """Kill the driver."""
+    """Kill the robot client."""
     os.kill(trial.driver_pid, signal.SIGKILL)
 
 
 def summarize(case: str, values: Array) -> dict[str, object]:
-    """Return the row of a case: medians and worst values, None where there are none."""
+    """Return the row of a case: medians and worst values, None if there are none."""
 
     def number(x: float) -> float | None:
         return None if np.isnan(x) else round(float(x), 4)
@@ -263,7 +269,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--trials", type=int, default=20)
-    parser.add_argument("--out", type=Path, help="file for the rows, JSON")
+    parser.add_argument("--out", type=Path, help="JSON file of the rows.")
     given = parser.parse_args()
     bench = Bench()
     cases: dict[str, tuple[Callable[[Trial], None], bool]] = {

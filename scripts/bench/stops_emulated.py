@@ -2,13 +2,17 @@
 
     python scripts/bench/stops_emulated.py --out docs/data/stops_emulated.json
 
-The driver of the robot moves the emulated arm at 0.3 to 0.7 m/s when one or two faults
-are switched on, in emulated time; the second comes 0 to 200 ms after the first. Printed
-are medians and worst values over the trials: the time from the first fault until
-braking begins (the driver or the controller slows down what the arm is sent), the time
-until the paddle rests (below 0.01 m/s), and the largest deceleration of a joint and of
-the tool, over 2 ms. Commands that stop count from the last one. `stops.py` measures the
-same with processes, the real client and a real clock.
+The robot client moves the emulated arm at 0.3 to 0.7 m/s in emulated time. Then one or
+two faults are switched on, the second one 0 to 200 ms after the first. The script
+prints medians and worst values over the trials:
+
+* time from the first fault until braking begins, when the robot client or the
+  controller reduces the speed that is sent to the arm,
+* time until the paddle is at rest (below 0.01 m/s),
+* largest deceleration of a joint and of the tool, over 2 ms.
+
+For commands that stop, times count from the last command. `stops.py` measures the same
+with processes, the real client and a real clock.
 """
 
 from __future__ import annotations
@@ -28,27 +32,28 @@ from marl_airhockey.types import Array
 
 CONTROL_DT = 0.05
 LISTEN = 4.0
-"""Time after a fault for which the arm is watched, s"""
+"""Time for which the arm is observed after a fault, s."""
 CONTROLLER = (
     *("protective_stop", "emergency_stop", "silent_robot", "delayed_packets"),
     *("dropped_connection", "loss_of_real_time", "puck_under_paddle"),
     *("speed_slider", "power_off"),
 )
-"""Faults of the controller; local control stops no program that runs"""
+"""Faults of the controller, without local control, which does not stop a running
+URScript."""
 
 
 class Caller:
-    """Caller of the driver: a policy that commands one velocity, and its faults."""
+    """Caller of the robot client: commands one velocity and causes faults."""
 
     def __init__(self, robot: EmulatedRobot, velocity: Array) -> None:
         self.robot, self.velocity = robot, velocity
         self.silent, self.sends_nan = False, False
         self._due = robot.now
         self.last = robot.now
-        """Time of the last command that made sense, s"""
+        """Time of the last valid command, s."""
 
     def step(self) -> None:
-        """Send a command, if one is due."""
+        """Send a command if one is due."""
         if self.robot.now + 1e-9 < self._due:
             return
         self._due += CONTROL_DT
@@ -62,20 +67,20 @@ class Caller:
         self.robot.send_action(velocity, CONTROL_DT)
 
     def fall_silent(self) -> None:
-        """Send nothing more."""
+        """Stop sending commands."""
         self.silent = True
 
     def send_nan(self) -> None:
-        """Send what is no number from now on."""
+        """Send nan from now on."""
         self.sends_nan = True
 
     def kill_driver(self) -> None:
-        """End the driver's process."""
+        """End the process of the robot client."""
         self.robot.driver_runs = False
 
 
 def faults_of(caller: Caller) -> dict[str, Callable[[], None]]:
-    """Return what switches each fault on, by name."""
+    """Return functions that switch faults on, by name."""
 
     def of_controller(name: str) -> Callable[[], None]:
         return lambda: caller.robot.switch(name)
@@ -89,7 +94,7 @@ def faults_of(caller: Caller) -> dict[str, Callable[[], None]]:
 
 
 def speed_sent(robot: EmulatedRobot) -> float:
-    """Return the speed of what the driver sends, m/s."""
+    """Return the speed that the robot client sends, m/s."""
     sent = robot.get_observation()
     return float(np.hypot(sent.sent_vx, sent.sent_vy))
 
@@ -120,7 +125,7 @@ def try_faults(names: tuple[str, ...], rng: np.random.Generator) -> tuple[float,
         before = robot.controller.arm.speeds, np.linalg.norm(robot.true_velocity)
         began = robot.now
         robot.advance(DT)
-        # A driver that waits for the controller lets more than DT pass.
+        # More than DT passes if the robot client waits for the controller.
         passed = robot.now - began
         after = robot.controller.arm.speeds, np.linalg.norm(robot.true_velocity)
         slowing = float(np.max(np.abs(before[0]) - np.abs(after[0]))) / passed
@@ -137,7 +142,7 @@ def try_faults(names: tuple[str, ...], rng: np.random.Generator) -> tuple[float,
 
 
 def measure(names: tuple[str, ...], trials: int) -> dict[str, object]:
-    """Return medians and worst values of some trials; None where there are none."""
+    """Return medians and worst values of some trials; None if there are none."""
 
     def number(x: float) -> float | None:
         return None if np.isnan(x) else round(float(x), 4)
@@ -179,7 +184,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--trials", type=int, default=20)
-    parser.add_argument("--out", type=Path, help="file for the rows, JSON")
+    parser.add_argument("--out", type=Path, help="JSON file of the rows.")
     given = parser.parse_args()
     robot = EmulatedRobot()
     names = [*faults_of(Caller(robot, np.zeros(2)))]

@@ -1,13 +1,14 @@
-"""Benchmark of teleoperation in the virtual lab: how late one sees, and leads.
+"""Measure the latency of teleoperation in the virtual lab, by mouse and by shadow.
 
     python scripts/bench/teleop.py --seconds 20
 
-By mouse: `airhockey teleop` in headless Chromium, the button held and the paddle led;
-printed is the time from the middle of a picture's exposure until the page has drawn
-it, and the part of it that the lab's camera takes by itself (exposure, readout,
-transfer). By shadow: a hand goes around under its camera and leads the arm; printed is
-the time by which the arm is behind the hand, and how far it is off when that is taken
-off. Browser, lab, arm and camera share the machine's cores, whose load is printed.
+By mouse, `airhockey teleop` runs in headless Chromium, with the button held and the
+paddle guided. The script prints the time from the middle of a frame's exposure until
+the page has drawn it, and the part of the lab's camera (exposure, readout, transfer).
+
+By shadow, a hand moves under its camera and guides the arm. The script prints the time
+by which the arm is behind the hand, and the remaining error of the position. Browser,
+lab, arm and camera share the cores of the machine, whose load is printed.
 """
 
 from __future__ import annotations
@@ -37,13 +38,14 @@ from marl_airhockey.types import Array
 ARGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 HAND = {"middle": [0.0, 0.0], "amplitude": [0.08, 0.12], "period": 3.0}
 CONTROL_DT = 0.05
-"""s"""
+"""Time between two actions, s."""
 CAUGHT = 4.0
-"""Time after which the hand leads, s: it has come by the arm's paddle"""
+"""Time after which the hand guides the arm, s. By then it has passed the arm's
+paddle."""
 
 
 def lead(page: Page, seconds: float) -> list[float]:
-    """Lead the paddle to and fro; return what the page says of its video, ms."""
+    """Guide the paddle to and fro; return the latencies of the page's video, ms."""
     page.locator("#go").click()
     box = page.locator("#table").bounding_box()
     assert box is not None
@@ -66,10 +68,10 @@ def lead(page: Page, seconds: float) -> list[float]:
 
 
 def by_mouse(seconds: float) -> list[float]:
-    """Return what a page in Chromium says of its video, ms."""
+    """Return the latencies of the video on a page in Chromium, ms."""
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
-        raise SystemExit("there is no Chromium here: apt-get install chromium")
+        raise SystemExit("Chromium is not installed: apt-get install chromium")
     command = [sys.executable, "-m", "marl_airhockey.cli", "teleop", "juggle", "--lab"]
     with tempfile.TemporaryDirectory() as folder:
         process = subprocess.Popen(
@@ -99,7 +101,7 @@ def by_mouse(seconds: float) -> list[float]:
 
 
 def by_shadow(seconds: float) -> tuple[float, float]:
-    """Return how late the arm is, s, and how far off then in the median, m."""
+    """Return the latency of the arm, s, and its remaining position error, median, m."""
     with running_lab() as client, lab_rig() as table, hand_rig() as hand:
         client.ask("hand", **HAND)
         world = ah.make_world(
@@ -131,7 +133,12 @@ def by_shadow(seconds: float) -> tuple[float, float]:
 
 
 def _behind(arm: Array, hand: Array) -> tuple[float, float]:
-    """Return the time by which the arm is behind, s, and what is off then, m."""
+    """Return the latency of an arm, s, and its remaining position error, median, m.
+
+    Args:
+        arm: Rows of time, s, and position, m, of the arm's paddle, (n, 3).
+        hand: Rows of time, s, and position, m, of the hand, (m, 3).
+    """
     inside = arm[:, 0] > hand[0, 0] + 0.5
     delay = find_delay(arm[inside], hand)
     then = arm[inside, 0] - delay
@@ -140,7 +147,7 @@ def _behind(arm: Array, hand: Array) -> tuple[float, float]:
 
 
 def main(
-    seconds: Annotated[float, typer.Option(help="Of each case.")] = 20.0,
+    seconds: Annotated[float, typer.Option(help="Duration of each case, s.")] = 20.0,
 ) -> None:
     """Measure and print."""
     told = by_mouse(seconds)
@@ -148,12 +155,12 @@ def main(
     drawn = float(np.median(told))
     rows = Table("", "ms", "load")
     load = f"{os.getloadavg()[0]:.1f}"
-    rows.add_row("mouse: exposed until drawn, p50", f"{drawn:.1f}", load)
-    rows.add_row("  of that the camera's own", f"{own:.1f}", "")
-    rows.add_row("  captured until drawn", f"{drawn - own:.1f}", "")
+    rows.add_row("mouse: from exposure to drawing, p50", f"{drawn:.1f}", load)
+    rows.add_row("  part of the camera", f"{own:.1f}", "")
+    rows.add_row("  part after the camera", f"{drawn - own:.1f}", "")
     delay, off = by_shadow(seconds)
     rows.add_row("shadow: arm behind the hand", f"{1e3 * delay:.0f}", load)
-    rows.add_row("  off then, mm", f"{1e3 * off:.1f}", "")
+    rows.add_row("  position error, mm", f"{1e3 * off:.1f}", "")
     Console().print(rows)
 
 

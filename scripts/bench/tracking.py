@@ -1,13 +1,13 @@
-"""Measure how an arm tracks commands: a circle at 0.7 m/s, 20 commands a second.
+"""Measure how an arm tracks commands: a circle at 0.7 m/s, 20 commands per second.
 
     python scripts/bench/tracking.py --out docs/data/tracking.csv \
         --plot docs/images/tracking.png
 
-The reference is the path of the commands themselves: velocities that are reached by
-linear ramps of 50 ms. The latency is the delay of the reference at which the paddle, as
-it truly moved, is closest to it; the tracking error is what is left then. In emulated
-time all is in one process; in real time the caller, the driver with the real client and
-the lab's controller are processes, with all their delays.
+The reference is the path of the commands: velocities that are reached by linear ramps
+of 50 ms. The latency is the delay of the reference at which the true paddle is closest
+to it. The tracking error is the remaining distance. In emulated time everything is in
+one process. In real time the caller, the robot client (with the real client) and the
+lab's controller are separate processes with all their delays.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ import matplotlib.pyplot as plt
 SPEED, RADIUS = 0.7, 0.12
 CONTROL_DT = 0.05
 RAMP, SECONDS = 1.0, 8.0
-"""Time in which the circle comes to its speed, and time of all, s"""
+"""Time in which the circle reaches its speed, and total time, s."""
 
 
 class Record(NamedTuple):
-    """Record of a motion."""
+    """Record of a movement."""
 
     commands: Array
-    """(n, 3) time, s, and velocity, m/s, of each command"""
+    """Time, s, and velocity, m/s, of each command, (n, 3)."""
     paddle: Array
-    """(m, 3) time, s, and position, m, of the paddle as it truly was"""
+    """Time, s, and position, m, of the true paddle, (m, 3)."""
 
 
 def velocity_at(t: float) -> Array:
-    """Return the velocity (2,), m/s, that a command asks for at a time."""
+    """Return the velocity of the command at a time, m/s, (2,)."""
     speed = SPEED * min(t / RAMP, 1.0)
     path = SPEED * (0.5 * t**2 / RAMP if t < RAMP else t - 0.5 * RAMP)
     angle = path / RADIUS
@@ -53,7 +53,7 @@ def velocity_at(t: float) -> Array:
 
 
 def start_in(reach: tuple[tuple[float, float], ...]) -> Array:
-    """Return the position (2,), m, at which the circle in the middle begins."""
+    """Return the position, m, at which the circle in the middle begins, (2,)."""
     x, y = 0.5 * (np.min(reach, 0) + np.max(reach, 0))
     return np.array([x + RADIUS, y])
 
@@ -75,7 +75,7 @@ def in_emulated_time(smoothing: Smoothing) -> Record:
 
 
 def in_real_time(lab: Lab, smoothing: Smoothing) -> Record:
-    """Return the record of a robot whose driver and controller are processes."""
+    """Return the record of a robot whose client and controller are processes."""
     setup = lab.setup
     config = RobotConfig(
         *(lab.host, setup.mounting, setup.seat.reach), smoothing=smoothing
@@ -97,7 +97,7 @@ def in_real_time(lab: Lab, smoothing: Smoothing) -> Record:
 
 
 def reference_of(record: Record, times: Array) -> Array:
-    """Return the positions (n, 2) of the commands' path at some times, m."""
+    """Return the positions of the commands' path at some times, m, (n, 2)."""
     fine = np.arange(record.commands[0, 0], times[-1], 0.001)
     sent, velocity = record.commands[:, 0], record.commands[:, 1:]
     before = np.vstack([np.zeros(2), velocity[:-1]])
@@ -125,7 +125,7 @@ def judge(record: Record) -> tuple[float, float, float]:
 
 
 def draw(record: Record, latency: float, file: Path) -> None:
-    """Draw two seconds of a record."""
+    """Plot two seconds of a record."""
     times, paddle = record.paddle[:, 0], record.paddle[:, 1:]
     some = (times > times[0] + 3.0) & (times < times[0] + 5.0)
     reference = reference_of(record, times)
@@ -147,8 +147,8 @@ def draw(record: Record, latency: float, file: Path) -> None:
 
 
 def main(
-    out: Annotated[Path | None, typer.Option(help="CSV of the rows.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="PNG of the motion.")] = None,
+    out: Annotated[Path | None, typer.Option(help="CSV file of the rows.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="PNG file of the movement.")] = None,
 ) -> None:
     """Measure every filter in emulated and in real time, and print a table."""
     rows = []

@@ -1,12 +1,14 @@
-"""Measure the eye of the real table on pictures whose truth is known.
+"""Measure the vision of the real table on images with known ground truth.
 
     python scripts/bench/vision.py --seconds 60
 
-A puck flies over the virtual lab's table, meets rails and a paddle that sweeps to and
-fro, and its camera takes pictures of it, with lens, noise, blur, shadows and the arm in
-the way. Printed for each way of calibrating the camera: how far from the truth the puck
-is seen (where half of it or more is visible), how wrong the filter's velocity is at the
-moment of each picture, and the CPU time of finding the puck in one.
+A puck moves over the table of the virtual lab. It hits rails and a paddle that moves to
+and fro. The lab's camera takes images of it, with lens, noise, blur, shadows and the
+arm. For each method of calibrating the camera the script prints
+
+* the position error of the puck, where at least half of it is visible,
+* the error of the filter's velocity at the time of each image,
+* the CPU time of finding the puck in an image.
 """
 
 from __future__ import annotations
@@ -42,39 +44,39 @@ from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.types import Array
 
 SERVE = 5.0
-"""Time after which the puck is served anew, s"""
+"""Time after which the puck is re-served, s."""
 CLICK = 1.5
-"""Standard error of a click, px"""
+"""Standard error of a click, px."""
 
 
 class Shot(NamedTuple):
-    """Picture with its truth."""
+    """Image with its ground truth."""
 
     time: float
-    """s"""
+    """Time of the image, s."""
     puck: Array
-    """(2,) m"""
+    """Position of the puck, m, (2,)."""
     velocity: Array
-    """(2,) of the puck, m/s"""
+    """Velocity of the puck, m/s, (2,)."""
     picture: Array
-    """(H, W, 3)"""
+    """Image, (H, W, 3)."""
 
 
 class Sweep:
-    """Paddle that sweeps to and fro over its reach."""
+    """Paddle that moves to and fro over its workspace."""
 
     def __init__(self, setup: LabSetup) -> None:
         self._home, self._size = setup.home, np.array([0.10, 0.25])
 
     def at(self, now: float) -> tuple[Array, Array]:
-        """Return place, m, and velocity, m/s, at a time, s."""
+        """Return position, m, and velocity, m/s, at a time, s."""
         rate = np.array([1.9, 1.3])
         place = self._home + self._size * np.sin(rate * now)
         return place, self._size * rate * np.cos(rate * now)
 
 
 def calibrations(camera: TableCamera, setup: LabSetup) -> dict[str, CameraView]:
-    """Return views by the way in which they were found."""
+    """Return the views of the camera by the method of their calibration."""
     table, true = setup.geometry, lab_view(setup.geometry)
     away = Seen(None, np.zeros(2), setup.home, np.zeros(2))
     images = [camera.photograph(away, k) for k in range(6)]
@@ -96,7 +98,13 @@ def calibrations(camera: TableCamera, setup: LabSetup) -> dict[str, CameraView]:
 
 
 def film(setup: LabSetup, seconds: float, rate: float) -> list[Shot]:
-    """Return what the camera saw."""
+    """Return the images of the camera.
+
+    Args:
+        setup: Setup of the lab.
+        seconds: Duration, s.
+        rate: Number of images per second.
+    """
     edge = -float(setup.geometry.offsets[0])
     base = np.array([edge - BEHIND, 0.0])
     camera = TableCamera(setup.geometry, lab_view(setup.geometry), base)
@@ -120,7 +128,7 @@ def film(setup: LabSetup, seconds: float, rate: float) -> list[Shot]:
 def measure(
     view: CameraView, setup: LabSetup, shots: list[Shot], colour: Colour
 ) -> dict[str, float]:
-    """Return the errors of one view on pictures."""
+    """Return the errors of one view on images."""
     table = setup.geometry
     length, width = (float(x) for x in table.size / 2)
     detector = Detector(view, colour, table.puck_radius, (length, width))
@@ -172,7 +180,9 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--rate", type=float, default=60.0, help="pictures a second")
+    parser.add_argument(
+        "--rate", type=float, default=60.0, help="Number of images per second."
+    )
     given = parser.parse_args()
     cv2.setNumThreads(1)
     setup = LabSetup()
@@ -184,13 +194,13 @@ def main() -> None:
     there = Seen(np.array([0.3, 0.0]), np.zeros(2), setup.home, np.zeros(2))
     x, y = lab_view(setup.geometry).project(np.array([[0.3, 0.0, 0.003]]))[0]
     colour = Colour.around(camera.photograph(there), (float(x), float(y)))
-    print(f"{len(shots)} pictures, {given.rate:.0f} a second")
+    print(f"{len(shots)} images, {given.rate:.0f} per second")
     for name, view in calibrations(camera, setup).items():
         m = measure(view, setup, shots, colour)
         print(
-            f"{name:30} found {m['found']:.1%}; place {m['mean']:.2f} mm mean, "
+            f"{name:30} found {m['found']:.1%}; position {m['mean']:.2f} mm mean, "
             f"{m['p95']:.2f} p95, {m['most']:.1f} at most; velocity {m['rmse']:.3f} "
-            f"m/s RMSE, {m['median']:.3f} median; {m['cpu']:.2f} CPU-ms a picture"
+            f"m/s RMSE, {m['median']:.3f} median; {m['cpu']:.2f} CPU-ms per image"
         )
 
 

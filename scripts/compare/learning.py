@@ -1,9 +1,10 @@
-"""CPU time that the engines torch and sb3 need for the same training, seed by seed.
+"""Compare the CPU time of the engines torch and sb3 for the same training.
 
     python scripts/compare/learning.py juggle --steps 1500000 --seeds 5
 
-The engines take turns, each run in a process of its own on one thread. The time is that
-of training alone, as in ``evaluations.csv``: no compiling, no evaluations.
+The engines take turns, seed by seed. Each run has a separate process and one thread.
+The time is that of learning in ``evaluations.csv``, without compilation and
+evaluations.
 """
 
 from __future__ import annotations
@@ -33,9 +34,11 @@ def measure(scenario: str, steps: int, seed: int, engine: str) -> tuple[float, f
 
 
 def main(
-    scenario: Annotated[str, typer.Argument(help="A task.")],
-    steps: Annotated[int, typer.Option(help="Steps of each run.")] = 1_500_000,
-    seeds: Annotated[int, typer.Option(help="Runs of each engine.")] = 5,
+    scenario: Annotated[str, typer.Argument(help="Name of a task.")],
+    steps: Annotated[
+        int, typer.Option(help="Number of steps of each run.")
+    ] = 1_500_000,
+    seeds: Annotated[int, typer.Option(help="Number of runs of each engine.")] = 5,
 ) -> None:
     """Train with both engines in turns and print medians, ranges and the ratio."""
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in ENGINES}

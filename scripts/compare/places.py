@@ -1,4 +1,4 @@
-"""Places that are compared: this checkout, another one, or an installed wheel."""
+"""Installations that are compared: this checkout, another one, or a wheel."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parents[2]
-"""This checkout"""
+"""Folder of this checkout."""
 
 
 def started(place: Path, cache: str | None = None) -> tuple[str, dict[str, str]]:
-    """Return the interpreter of a place, and the environment of its processes.
+    """Return the interpreter of an installation, and the environment of its processes.
 
     Args:
         place: Folder of a checkout, or the interpreter of an environment.
-        cache: Folder of compiled code; None for the user's.
+        cache: Folder of compiled code; None for that of the user.
     """
     known = {**os.environ}
     if cache is not None:

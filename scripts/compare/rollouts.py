@@ -1,11 +1,12 @@
-"""Compare rollouts of this tree with those of another checkout, number by number.
+"""Compare rollouts of this checkout with those of another one, number by number.
 
     python scripts/compare/rollouts.py CHECKOUT
 
-plays 200 steps of 3 worlds of every scenario with random actions, in all profiles and
-forms of observations, with goals="dict" and with a driver of paddle_0 where it has
-them, in a process for each tree and scenario: numba must give the same bits, pymunk the
-same numbers to 1e-9. Exits with 1 if anything differs.
+The script plays 200 steps of 3 worlds of every scenario with random actions. It does so
+in all profiles and observation types, with goals="dict", and with a driver of paddle_0
+where the scenario supports it. Each checkout and scenario has a separate process. numba
+must give the same bits, and pymunk the same numbers to 1e-9. The exit status is 1 if
+anything differs.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ CASES: dict[str, dict[str, Any]] = {
     "dict": {"goals": "dict"},
     "ur5e dict": {"profile": "ur5e", "goals": "dict"},
 }
-"""Keywords by name"""
+"""Keywords by name of the case."""
 PLAY = """
 import json, sys
 import numpy as np
@@ -81,7 +82,7 @@ np.savez(path, **rows)
 
 
 def cases_of(scenario: str) -> dict[str, dict[str, Any]]:
-    """Return the cases that a scenario has: dict goals and one open seat if it can."""
+    """Return the cases that a scenario supports."""
     game, found = ah.make_scenario(scenario), dict(CASES)
     if not isinstance(game, GoalScenario):
         found = {name: words for name, words in found.items() if "goals" not in words}
@@ -91,7 +92,7 @@ def cases_of(scenario: str) -> dict[str, dict[str, Any]]:
 
 
 def play(tree: Path, scenario: str, backend: str) -> dict[str, np.ndarray]:
-    """Return what a tree's rollouts gave, by case and name, (steps, worlds, ...)."""
+    """Return the rollouts of a checkout, by case and name, (steps, worlds, ...)."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "rollout.npz"
         cases = json.dumps(cases_of(scenario))
@@ -104,7 +105,7 @@ def play(tree: Path, scenario: str, backend: str) -> dict[str, np.ndarray]:
 
 
 def difference(here: dict[str, np.ndarray], there: dict[str, np.ndarray]) -> float:
-    """Return the largest difference of two rollouts; inf where one has more arrays."""
+    """Return the largest difference of two rollouts; inf if one has more arrays."""
     if here.keys() != there.keys():
         return float("inf")
     worst = 0.0
@@ -112,7 +113,7 @@ def difference(here: dict[str, np.ndarray], there: dict[str, np.ndarray]) -> flo
         other = there[name]
         if mine.shape != other.shape:
             return float("inf")
-        # Equal infinities and nans are no difference.
+        # Equal infinities and nans do not differ.
         same = (mine == other) | ((mine != mine) & (other != other))
         gap = np.abs(mine[~same].astype(float) - other[~same].astype(float))
         worst = max(worst, float(np.nan_to_num(gap, nan=np.inf).max(initial=0.0)))
@@ -120,7 +121,7 @@ def difference(here: dict[str, np.ndarray], there: dict[str, np.ndarray]) -> flo
 
 
 def main(checkout: Path, only: str = "") -> None:
-    """Play both trees and print the largest difference of each case."""
+    """Play both checkouts and print the largest difference of each case."""
     wrong, trees = 0, (Path(__file__).parents[2], checkout.resolve())
     for backend, tolerance in TOLERANCE.items():
         table = Table(f"{backend}", *CASES)
@@ -139,7 +140,7 @@ def main(checkout: Path, only: str = "") -> None:
             table.add_row(scenario, *cells)
         Console(width=120).print(table)
     if wrong:
-        raise SystemExit(f"{wrong} rollouts differ by more than they may")
+        raise SystemExit(f"{wrong} rollouts differ by more than the tolerance")
 
 
 if __name__ == "__main__":

@@ -1,12 +1,12 @@
-"""Compare the speed of this checkout with that of another place, in rounds of one run.
+"""Compare the speed of this checkout with another installation, in rounds of one run.
 
     python scripts/compare/speed.py CHECKOUT
-    python scripts/compare/speed.py PYTHON --empty   # code that a wheel holds
+    python scripts/compare/speed.py PYTHON --empty   # interpreter with a wheel
 
-measures the dict environment, 4096 worlds, and 256 worlds in which every seat chases
-the puck, in steps per CPU-second of a process for each tree, with the compiled 2D
-backend, called batched in commit ec48060. The ratio is
-the median over the rounds, each of which measures both trees one after the other.
+The cases are the PettingZoo environment, 4096 worlds, and 256 worlds in which every
+seat chases the puck. The backend is numba, which old checkouts (commit ec48060) name
+``batched``. The script prints steps per CPU-second of a process. Each round measures
+both installations one after the other, and the ratio is the median over the rounds.
 """
 
 from __future__ import annotations
@@ -100,14 +100,21 @@ def ask(child: subprocess.Popen[str], seconds: float) -> float:
 
 def main(
     other: Path,
-    cases: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(CASES),
-    rounds: Annotated[int, typer.Option(help="Rounds.")] = 9,
-    seconds: Annotated[float, typer.Option(help="CPU-seconds of a case.")] = 2.0,
+    cases: Annotated[
+        str, typer.Option(help="Names of cases, separated by commas.")
+    ] = ",".join(CASES),
+    rounds: Annotated[int, typer.Option(help="Number of rounds.")] = 9,
+    seconds: Annotated[
+        float, typer.Option(help="CPU-seconds of each case in a round.")
+    ] = 2.0,
     empty: Annotated[
-        bool, typer.Option(help="Give the other place an empty cache of compiled code.")
+        bool,
+        typer.Option(
+            help="Give the other installation an empty cache of compiled code."
+        ),
     ] = False,
 ) -> None:
-    """Measure both trees and print their rates and ratios."""
+    """Measure both installations and print their rates and ratios."""
     table = Table("steps per CPU-s", "here", "there", "here / there", "spread")
     # An interpreter of an environment is a link that must not be resolved.
     places = HERE, other.absolute()

@@ -1,10 +1,10 @@
-"""Compare the cost of the first start of this checkout with that of another place.
+"""Compare the cost of the first start of this checkout with another installation.
 
     python scripts/compare/start.py CHECKOUT
-    python scripts/compare/start.py PYTHON     # of an environment that has a wheel
+    python scripts/compare/start.py PYTHON     # interpreter with a wheel
 
-The processes of a case begin together with an empty cache of compiled code, or with one
-that another scenario has filled, and take a step of one world.
+The processes of a case start together, with a cache of compiled code that is empty or
+was filled by another scenario. Each makes one step of one world.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from rich.table import Table
 
 
 class Case(NamedTuple):
-    """Scenario, with its options, and the processes that start it."""
+    """Scenario, with its options, and the number of processes that start it."""
 
     scenario: str
     options: dict[str, Any]
     processes: int = 1
     after: str = ""
-    """Scenario that has filled the cache"""
+    """Scenario that fills the cache before; "" for an empty cache."""
 
 
 CASES = {
@@ -57,17 +57,17 @@ class Cost(NamedTuple):
     """Cost of the processes of a case."""
 
     seconds: float
-    """Time until the last one has ended, s"""
+    """Time until the last process ends, s."""
     cpu_seconds: float
-    """CPU-seconds of all"""
+    """CPU-seconds of all processes."""
     memory: float
-    """Memory of the largest, GB"""
+    """Memory of the largest process, GB."""
 
 
 def start(place: Path, case: str) -> Cost:
-    """Start a case by an interpreter, or by this one in a checkout; return the cost."""
+    """Start a case in a checkout or with an interpreter; return the cost."""
     if case not in CASES:
-        raise typer.BadParameter(f"no case {case!r}; there are {'; '.join(CASES)}")
+        raise typer.BadParameter(f"unknown case {case!r}; known: {'; '.join(CASES)}")
     scenario, options, processes, after = CASES[case]
     with tempfile.TemporaryDirectory() as folder:
         python, variables = started(place, folder)
@@ -94,12 +94,12 @@ def start(place: Path, case: str) -> Cost:
 
 def main(
     other: Path,
-    cases: Annotated[str, typer.Option(help="Separated by semicolons.")] = "; ".join(
-        CASES
-    ),
-    out: Annotated[Path | None, typer.Option(help="CSV file for the rows.")] = None,
+    cases: Annotated[
+        str, typer.Option(help="Names of cases, separated by semicolons.")
+    ] = "; ".join(CASES),
+    out: Annotated[Path | None, typer.Option(help="CSV file of the rows.")] = None,
 ) -> None:
-    """Start this checkout and another place with empty caches; print the costs."""
+    """Start this checkout and another installation; print the costs."""
     table = Table("first start: s, CPU-s, GB", "here", "there", "here / there")
     # An interpreter of an environment is a link that must not be resolved.
     places = {"here": HERE, "there": other.absolute()}

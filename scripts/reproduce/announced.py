@@ -1,12 +1,13 @@
-"""What the paper announces as further work: a study of each, with a figure.
+"""Studies of the further work that the paper announces, with one table.
 
     python scripts/reproduce/announced.py --seeds 3 --jobs 1
     python scripts/reproduce/announced.py --studies curriculum --seeds 3
     python scripts/reproduce/announced.py --show
 
-A study compares policies in one environment, over 500 test seeds; `STUDIES` has them.
-They are trained by PPO with the preset and what a case changes. A run that ends adds a
-row to ``docs/data/announced.csv``; a run whose row is there is not trained again.
+A study compares policies in one environment, over 500 test seeds. `STUDIES` lists them.
+The policies are trained by PPO with the preset and the changes of a case. A finished
+run adds a row to ``docs/data/announced.csv``. A run that has a row is not trained
+again.
 """
 
 from __future__ import annotations
@@ -28,15 +29,15 @@ from marl_airhockey.policies.load import load_policy
 
 @dataclass(frozen=True)
 class Study:
-    """Study: a scenario, and ways to train for it."""
+    """Study: a scenario, and cases of training for it."""
 
     scenario: str
     cases: dict[str, Row]
-    """Changes of the preset, by the name of the case"""
+    """Changes of the preset, by the name of the case."""
     options: Row = field(default_factory=dict)
-    """Options of the environment in which all cases are evaluated"""
+    """Options of the environment in which all cases are evaluated."""
     first: str = ""
-    """Scenario whose policy of the same seed begins the cases with ``init``"""
+    """Scenario whose policy of the same seed initializes the cases with ``init``."""
 
 
 POSTS = {"obstacles": [[0.05, 0.1, 0.04], [0.05, -0.1, 0.04]]}
@@ -70,13 +71,13 @@ STUDIES = {
 }
 """Studies by name.
 
-* curriculum: ranges of starts from a tenth, widening with success, or whole.
+* curriculum: ranges of starts that begin at a tenth and widen, or whole ranges.
 * transfer: 131,072 steps from the weights of touch, or from scratch.
 * sequence: five goals in turn.
-* two pucks: juggling of two.
-* obstacles: two posts on the way to the goals.
-* reward regions: a disc amid the reach in which the paddle pays 2 per second.
-* drag regions: a disc in the middle of the table that slows the puck at 2 1/s.
+* two pucks: juggling of two pucks.
+* obstacles: two posts in front of the goals.
+* reward regions: a disc in the workspace with a reward of -2 per second.
+* drag regions: a disc in the middle of the table with a drag of 2 1/s.
 """
 EPISODES = 500
 ROWS = DATA / "announced.csv"
@@ -111,20 +112,20 @@ def train_case(name: str, case: str, seed: int, folder: Path) -> Row:
 
 
 def train(scenario: str, changes: Row, place: Path) -> Path:
-    """Train a run, or go on with it, or take it as it is; return its folder."""
+    """Train a run, or resume it, or use it if it is finished; return its folder."""
     config = preset(scenario, changes)
     run_training(None if (place / "config.toml").exists() else config, place)
     return place
 
 
 def order(row: Row) -> tuple[int, int]:
-    """Return what rows are sorted by."""
+    """Return the sort key of a row."""
     cases = [(name, case) for name, study in STUDIES.items() for case in study.cases]
     return cases.index((row["study"], row["case"])), int(row["seed"])
 
 
 def table() -> list[list[str]]:
-    """Return the cells of the table of all studies, the header first."""
+    """Return the cells of the table of all studies, beginning with the header."""
     found, rows = [["study", "case", "success", "return", "steps", "seeds"]], read(ROWS)
     for name, study in STUDIES.items():
         for case in study.cases:
@@ -145,17 +146,21 @@ BOOK = Book(ROWS, KEY, order)
 
 
 def main(
-    studies: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(STUDIES),
-    seeds: Annotated[int, typer.Option(help="Runs of each case.")] = 1,
-    jobs: Annotated[int, typer.Option(help="Runs at a time.")] = 1,
+    studies: Annotated[
+        str, typer.Option(help="Names of studies, separated by commas.")
+    ] = ",".join(STUDIES),
+    seeds: Annotated[int, typer.Option(help="Number of runs of each case.")] = 1,
+    jobs: Annotated[int, typer.Option(help="Number of runs at a time.")] = 1,
     folder: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path(
         "runs/announced"
     ),
-    show: Annotated[bool, typer.Option(help="Print the table; train nothing.")] = False,
+    show: Annotated[
+        bool, typer.Option(help="Print the table without training.")
+    ] = False,
     again: Again = False,
     rows: RowsFile = None,
 ) -> None:
-    """Train what has no row yet."""
+    """Train the runs that have no row."""
     if show:
         for k, cells in enumerate(table()):
             print(f"| {' | '.join(cells)} |")

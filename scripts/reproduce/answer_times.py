@@ -1,12 +1,13 @@
-"""Measure how long a robot of each profile takes from an event to half of the answer.
+"""Measure the latency of each profile from an event to half of the velocity step.
 
     python scripts/reproduce/answer_times.py --out docs/data/answer_times.csv
 
-In every episode a paddle at rest is commanded half of its top speed. The answer time
-is the age of what is sensed at some step, plus the time from the command until the
-paddle has half of this velocity: dead time, servo and acceleration. The worlds make 200
-control steps a second, so that the velocity is known every 5 ms. The wait for the next
-decision, up to a control step, comes on top.
+In every episode a paddle at rest is commanded half of its top speed. The end-to-end
+latency is a sum of two times. The first is the observation latency at some step. The
+second is the time from the command until the paddle has half of this velocity: dead
+time, servo and acceleration. The worlds make 200 control steps per second, so the
+velocity is known every 5 ms. The time until the next decision, up to a control step, is
+not included.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
 
 STEP, STEPS, SHARE = 0.005, 200, 0.5
-"""Control step of the measurement, s, its number, and the action"""
+"""Control step of the measurement, s; number of steps; action."""
 
 
 def measure(profile: str, episodes: int) -> tuple[Array, Array]:
-    """Return the ages of what is sensed and the times of the paddles' answers, s."""
-    # Level and without drag, a puck that nothing touches keeps its velocity.
+    """Return observation latencies and times to half of the velocity step, s."""
+    # Without tilt, drag and contacts, the velocity of a puck is constant.
     level = {"tilt": 0.0, "slope": 0.0, "puck_drag": 0.0, "puck_damping": 0.0}
     quiet = {"position_noise": 0.0, "calibration_error": 0.0, "occlusion": 0.0}
     world = ah.make_world(
@@ -58,7 +59,7 @@ def measure(profile: str, episodes: int) -> tuple[Array, Array]:
 
 
 def half_times(speeds: Array, world: World) -> Array:
-    """Return the times at which speeds (episodes, steps) reach half a command, s."""
+    """Return the times at which speeds (episodes, steps) reach half of a command, s."""
     half = 0.5 * SHARE * world.episode.physics["paddle_speed"]
     after = (speeds >= half[:, None]).argmax(1)
     rows = np.arange(len(speeds))
@@ -68,7 +69,7 @@ def half_times(speeds: Array, world: World) -> Array:
 
 def main(
     episodes: Annotated[int, typer.Option(help="Number of episodes.")] = 4000,
-    out: Annotated[Path | None, typer.Option(help="CSV of the rows.")] = None,
+    out: Annotated[Path | None, typer.Option(help="CSV file of the rows.")] = None,
 ) -> None:
     """Measure all profiles and print a row for each."""
     rows = []

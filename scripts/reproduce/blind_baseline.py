@@ -1,18 +1,22 @@
-"""Search for controllers that pass a task without looking at its goal.
+"""Search for controllers that succeed in a task without observing its goal.
 
     python scripts/reproduce/blind_baseline.py --out docs/data/blind.csv
 
-A task that asks to aim is only as good as what does not aim fails it. Three kinds:
+A task that requires aiming is useful only if controllers that do not aim fail. There
+are three kinds of them:
 
-* "stroke", for hit_goal, hit_goal_velocity and move_block: the paddle goes to a place
-  that is linear in the puck's position and velocity, and strikes with one velocity when
-  the puck is near. 13 numbers; it never sees the goal or the block.
-* "circle", for reach_velocity: the paddle circles the goal at a speed that rises, blind
-  to the velocity that is asked for. 4 numbers.
-* "through", for reach: the paddle drives through the goal with one speed. 1 number.
+* "stroke", for hit_goal, hit_goal_velocity and move_block: the paddle moves to a
+  position that is linear in the puck's position and velocity. It strikes with a
+  constant velocity when the puck is near. It has 13 numbers and never observes the goal
+  or the block.
+* "circle", for reach_velocity: the paddle circles the goal at an increasing speed and
+  does not observe the target velocity. It has 4 numbers.
+* "through", for reach: the paddle passes through the goal with one speed. It has 1
+  number.
 
 A cross-entropy search over 12 generations finds the numbers in the profile `ideal`. The
-best of three searches plays other episodes, in `ideal` and, not tuned again, in `ur5e`.
+best result of three searches plays other episodes in `ideal` and, without further
+tuning, in `ur5e`.
 """
 
 from __future__ import annotations
@@ -35,17 +39,18 @@ from marl_airhockey.sim.contracts.driver import Driver, View
 from marl_airhockey.types import Array
 
 CANDIDATES, PLAYED, ELITE, GENERATIONS = 96, 48, 12, 12
-"""Candidates of a generation, episodes of each, and those whose mean is the next"""
+"""Candidates of a generation, episodes of each, size of the elite whose mean is the
+next mean, and number of generations."""
 RESTARTS, CHECKED, CHECK_SEED = 3, 1000, 500_000
-"""Searches, of which the best is taken, and the episodes that say which it is"""
+"""Number of searches, number of episodes that select the best one, and their seed."""
 GAIN = 12.0
-"""Speed toward a place for each metre of distance, 1/s"""
+"""Speed toward a position per distance, 1/s."""
 Control = Callable[[View, Array], Array]
-"""Function of a view and of numbers (B, n) that returns velocities (B, 2), m/s"""
+"""Function of a view and of numbers (B, n) that returns velocities (B, 2), m/s."""
 
 
 def stroke(view: View, numbers: Array) -> Array:
-    """Return the velocities of the controller "stroke"."""
+    """Return the velocities of the controller "stroke", m/s, (B, 2)."""
     state, seat = view.state, view.seat
     own, puck = state.position[:, seat], state.puck[:, 0]
     moving = state.puck_velocity[:, 0]
@@ -58,7 +63,7 @@ def stroke(view: View, numbers: Array) -> Array:
 
 
 def circle(view: View, numbers: Array) -> Array:
-    """Return the velocities of the controller "circle"."""
+    """Return the velocities of the controller "circle", m/s, (B, 2)."""
     state, goal = view.state, view.scenario_memory["goal"]
     radius, first, rise, pull = numbers.T
     away = state.position[:, view.seat] - goal
@@ -72,10 +77,10 @@ def circle(view: View, numbers: Array) -> Array:
 
 
 def through(view: View, numbers: Array) -> Array:
-    """Return the velocities of the controller "through"."""
+    """Return the velocities of the controller "through", m/s, (B, 2)."""
     state, goal = view.state, view.scenario_memory["goal"]
     speed = np.abs(numbers[:, 0])
-    # Where it began is not known: it keeps its direction once it moves fast enough.
+    # The start is unknown, so the direction is constant once the paddle is fast enough.
     gap, moving = goal - state.position[:, view.seat], state.velocity[:, view.seat]
     underway = np.linalg.norm(moving, axis=1) > 0.5 * speed
     direction = np.where(underway[:, None], moving, gap)
@@ -84,7 +89,7 @@ def through(view: View, numbers: Array) -> Array:
 
 
 class Kind(NamedTuple):
-    """Kind of controller: where its search begins."""
+    """Kind of controller, and the distribution in which its search begins."""
 
     control: Control
     mean: Array
@@ -108,12 +113,12 @@ KINDS = {
 
 
 class Blind(Driver):
-    """Controller with numbers of its own in each world.
+    """Controller with separate numbers in each world.
 
     Args:
-        control: Function of its kind.
-        numbers: (B, n) numbers.
-        options: Options of the scenario that it plays.
+        control: Function of the kind of controller.
+        numbers: Numbers of the controllers, (B, n).
+        options: Options of the scenario.
     """
 
     def __init__(
@@ -124,7 +129,7 @@ class Blind(Driver):
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        """Return the velocities as fractions of top speed."""
+        """Return the velocities, divided by the top speed."""
         velocity = self.control(view, self.numbers)
         size = np.linalg.norm(velocity, axis=1)
         fit = np.maximum(size, view.top_speed)[:, None]
@@ -132,7 +137,7 @@ class Blind(Driver):
 
 
 def play(driver: Blind, task: str, profile: str, seed: int) -> EpisodeStatistics:
-    """Return what an episode of each row of numbers came to."""
+    """Return the statistics of one episode for each row of numbers."""
     count = len(driver.numbers)
     world = build_driven_world(
         driver, task, count, {"profile": profile, "options": driver.options}
@@ -144,7 +149,7 @@ def play(driver: Blind, task: str, profile: str, seed: int) -> EpisodeStatistics
 
 
 def search(task: str, kind: Kind, options: dict[str, Any]) -> Array:
-    """Return the numbers that succeed most often in the profile `ideal`."""
+    """Return the numbers with the highest success in the profile `ideal`."""
     found = [climb(task, kind, options, seed) for seed in range(RESTARTS)]
     scores = []
     for numbers in found:
@@ -154,7 +159,7 @@ def search(task: str, kind: Kind, options: dict[str, Any]) -> Array:
 
 
 def climb(task: str, kind: Kind, options: dict[str, Any], seed: int) -> Array:
-    """Return the numbers to which one search comes."""
+    """Return the numbers that one search finds."""
     rng = np.random.default_rng(seed)
     mean, spread = kind.mean.copy(), kind.spread.copy()
     for generation in range(GENERATIONS):
@@ -171,7 +176,7 @@ def climb(task: str, kind: Kind, options: dict[str, Any], seed: int) -> Array:
 def rows_of(
     task: str, options: dict[str, Any], episodes: int
 ) -> list[dict[str, object]]:
-    """Return the rows of a task: in both profiles."""
+    """Return the rows of a task, in both profiles."""
     kind = KINDS[task]
     numbers = search(task, kind, options)
     rows: list[dict[str, object]] = []
@@ -198,15 +203,17 @@ def rows_of(
 
 
 def main(
-    tasks: Annotated[str, typer.Option(help="Tasks, comma-separated.")] = ",".join(
-        KINDS
-    ),
+    tasks: Annotated[
+        str, typer.Option(help="Names of tasks, separated by commas.")
+    ] = ",".join(KINDS),
     option: Annotated[
         list[str] | None,
         typer.Option(help="Option of the scenarios, NAME=VALUE; repeatable."),
     ] = None,
-    episodes: Annotated[int, typer.Option(help="Episodes of a result.")] = 1000,
-    out: Annotated[Path | None, typer.Option(help="CSV of the rows.")] = None,
+    episodes: Annotated[
+        int, typer.Option(help="Number of episodes of a result.")
+    ] = 1000,
+    out: Annotated[Path | None, typer.Option(help="CSV file of the rows.")] = None,
 ) -> None:
     """Search and print a row for each task and profile."""
     rows = [

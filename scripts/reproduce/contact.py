@@ -1,10 +1,11 @@
-"""Contact of the arm's paddle with the table: statistics over every physics step.
+"""Measure the contact of the arm's paddle with the table, over every physics step.
 
     python scripts/reproduce/contact.py --steps 2000 --seeds 5
 
-Cases: random actions, full speed in random directions, the zoo's juggling policy, and
-the zoo's duel between two arms, for some seeds and control steps with the physics of
-the profile ur5e. Height and tilt are extremes, the force is a mean.
+The cases are random actions, full speed in random directions, the juggling policy of
+the zoo, and a duel between two arms with a policy of the zoo. Each has some seeds and
+control steps with the physics of the profile ur5e. Height and tilt are extremes, and
+the force is a mean.
 """
 
 from __future__ import annotations
@@ -23,19 +24,19 @@ from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
 
 JOINT_LIMIT = 0.9 * np.pi
-"""Limit of a joint's speed, rad/s"""
+"""Limit of the speed of a joint, rad/s."""
 ActionRule = Callable[[int, World], Array]
-"""Function of step number and world that returns actions (B, open seats, 2)"""
+"""Function of step number and world that returns actions (B, open seats, 2)."""
 
 
 def unsteady(seed: int) -> ActionRule:
-    """Return a rule that draws an action at every step."""
+    """Return a rule that samples an action at every step."""
     rng = np.random.default_rng(seed)
     return lambda k, world: rng.uniform(-1, 1, (world.num_worlds, len(world.open), 2))
 
 
 def sweeping(seed: int) -> ActionRule:
-    """Return a rule of full speed in one direction for 0.6 s, then in another."""
+    """Return a rule of full speed in a direction that changes every 0.6 s."""
     rng = np.random.default_rng(seed)
     held: dict[str, Array] = {}
 
@@ -49,7 +50,7 @@ def sweeping(seed: int) -> ActionRule:
 
 
 def nobody(seed: int) -> ActionRule:
-    """Return a rule of no actions: drivers have all seats."""
+    """Return a rule without actions, because drivers have all seats."""
     return lambda k, world: np.zeros((world.num_worlds, len(world.open), 2))
 
 
@@ -70,9 +71,13 @@ CASES: tuple[tuple[str, str, dict[str, Any], Callable[[int], ActionRule]], ...] 
 
 
 def main(
-    steps: Annotated[int, typer.Option(help="Control steps of each seed.")] = 2000,
-    seeds: Annotated[int, typer.Option(help="How many.")] = 5,
-    profile: Annotated[str, typer.Option(help="ideal, ur5e, gantry.")] = "ur5e",
+    steps: Annotated[
+        int, typer.Option(help="Number of control steps of each seed.")
+    ] = 2000,
+    seeds: Annotated[int, typer.Option(help="Number of seeds.")] = 5,
+    profile: Annotated[
+        str, typer.Option(help="Name of the profile: ideal, ur5e or gantry.")
+    ] = "ur5e",
 ) -> None:
     """Measure all cases and print a table."""
     table = Table(title=f"{seeds} seeds of {steps} control steps, {profile} profile")

@@ -2,11 +2,11 @@
 
     python scripts/reproduce/dataset_policies.py
 
-Each task is trained with its preset until half of the expert's success is reached; the
-expert is the zoo's policy. Kept are the policy at the evaluation nearest to that half,
-`medium`, and those at a third and at two thirds of the steps until then, `early` and
-`middle`. Success is that of sampled actions, as datasets have them. It takes about ten
-minutes of one core; tasks whose policies exist are not trained again, but for
+Each task is trained with its preset until it reaches half of the success of the expert,
+which is the policy of the zoo. The policy at the evaluation nearest to this half is
+`medium`. The policies at a third and at two thirds of its steps are `early` and
+`middle`. Success is that of sampled actions, as in the datasets. The script takes about
+ten minutes of one core. Tasks whose policies exist are not trained again without
 ``--again``.
 """
 
@@ -29,25 +29,25 @@ from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 
 SEED = 1000
-"""Seed of the training"""
+"""Seed of the training."""
 UPDATE = 1024 * 32
-"""Steps of one update, after each of which the policy is evaluated"""
+"""Number of steps of an update; the policy is evaluated after each update."""
 EPISODES = 500
 HALF = 0.5
 
 
 class EnoughError(Exception):
-    """The policy is good enough."""
+    """The policy has reached the required success."""
 
 
 def success_of(path: Path, task: str, sampled: bool) -> float:
-    """Return the success of a policy."""
+    """Return the success of a policy, with sampled or mean actions."""
     policy = load_policy(path, deterministic=not sampled)
     return evaluate(policy, task, episodes=EPISODES, name=task).success
 
 
 def until(goal: float, folder: Path, task: str) -> Callable[[int, int, Metrics], None]:
-    """Return a function that keeps each evaluated policy, and stops at a success."""
+    """Return a function that saves each evaluated policy and stops at a success."""
     kept = folder.with_name(f"{folder.name}-snapshots")
     kept.mkdir(parents=True, exist_ok=True)
     seen = set[float]()
@@ -64,7 +64,7 @@ def until(goal: float, folder: Path, task: str) -> Callable[[int, int, Metrics],
 
 
 def train_task(task: str, folder: Path) -> dict[str, float]:
-    """Train a task, copy its three policies; return their success."""
+    """Train a task and copy its three policies; return their success."""
     expert = success_of(
         Path(__file__).parents[2] / f"marl_airhockey/zoo/{task}.npz", task, False
     )
@@ -97,7 +97,7 @@ def main(
     """Train the tasks whose policies are missing."""
     for task in TASKS:
         if snapshot(task, "medium").exists() and not again:
-            print(f"{task}: its policies are there; --again trains them")
+            print(f"{task}: the policies exist; --again trains them again")
             continue
         for place in (out / task, out / f"{task}-snapshots"):
             shutil.rmtree(place, ignore_errors=True)

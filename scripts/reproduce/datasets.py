@@ -1,14 +1,14 @@
-"""Build all named datasets and keep what is published of them.
+"""Build all named datasets and record their published properties.
 
     python scripts/reproduce/datasets.py
     python scripts/reproduce/datasets.py --names airhockey/juggle/expert-v0 --check
 
 Each dataset adds a row to ``docs/data/datasets.csv``: steps, episodes, success, mean
-return, MB, seconds of CPU time to build it, and the checksum of its columns. The rows
-become the `published.json` of the library. A dataset whose row is there is not built
-again; with ``--again`` it is, and with ``--check``, which compares its checksum alone.
-``--rows FILE`` keeps the rows elsewhere. ``--table`` prints the
-tables of the docs. Built datasets are removed afterwards unless they are kept.
+return, MB, CPU-seconds of building, and the checksum of its columns. The rows are also
+written to the `published.json` of the library. A dataset that has a row is not built
+again without ``--again`` or ``--check``. ``--check`` only compares the checksum.
+``--rows FILE`` writes the rows to another file. ``--table`` prints the tables of the
+docs. Each dataset is deleted after it was measured.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ DIGITS = {"success": 6, "returns": 4, "megabytes": 1, "cpu_seconds": 1}
 
 
 def measure(name: str, folder: Path) -> dict[str, Any]:
-    """Build a dataset; return its row."""
+    """Build a dataset and return its row."""
     began = time.process_time()
     build_dataset(find_dataset(name), folder)
     seconds = time.process_time() - began
@@ -46,12 +46,12 @@ def measure(name: str, folder: Path) -> dict[str, Any]:
 
 
 def read_rows(path: Path) -> dict[str, Row]:
-    """Return the rows by name; none if there is no file."""
+    """Return the rows of a file by name; an empty dict if there is no file."""
     return {row["name"]: row for row in read(path)}
 
 
 def keep(path: Path, rows: dict[str, Row]) -> None:
-    """Write the rows, in the order of the catalogue; publish the committed ones."""
+    """Write the rows in the order of the catalogue; publish the committed ones."""
     ordered = [rows[name] for name in datasets() if name in rows]
     write(path, ordered)
     if path != BOOK.path:
@@ -65,7 +65,7 @@ def keep(path: Path, rows: dict[str, Row]) -> None:
 
 
 def table_of(rows: dict[str, dict[str, Any]]) -> list[list[str]]:
-    """Return the cells of the table of success by task and tier, the header first."""
+    """Return the cells of the table of success by task and tier, header first."""
     found = [["task", *TIERS]]
     for task in dict.fromkeys(dataset.scenario for dataset in datasets().values()):
         names = [f"airhockey/{task}/{tier}-v0" for tier in TIERS]
@@ -76,7 +76,7 @@ def table_of(rows: dict[str, dict[str, Any]]) -> list[list[str]]:
 
 
 def tiers_of(rows: dict[str, dict[str, Any]]) -> list[list[str]]:
-    """Return the cells of the table of sizes and scores by tier, the header first."""
+    """Return the cells of the table of sizes and scores by tier, header first."""
     found = [["tier", "episodes", "MB", "CPU time, s", "score, mean of tasks"]]
     for tier in TIERS:
         own = [row for name, row in rows.items() if f"/{tier}-v" in name]
@@ -96,12 +96,15 @@ def tiers_of(rows: dict[str, dict[str, Any]]) -> list[list[str]]:
 
 
 def main(
-    names: Annotated[str, typer.Option(help="Comma-separated names; all.")] = "",
+    names: Annotated[
+        str, typer.Option(help="Names, separated by commas; by default all.")
+    ] = "",
     check: Annotated[
-        bool, typer.Option("--check", help="Build known ones again.")
+        bool,
+        typer.Option("--check", help="Build datasets again and compare checksums."),
     ] = False,
     table: Annotated[
-        bool, typer.Option("--table", help="Print the table alone.")
+        bool, typer.Option("--table", help="Only print the tables.")
     ] = False,
     out: Annotated[Path, typer.Option(help="Folder of the datasets.")] = Path(
         "runs/sets"
@@ -109,7 +112,7 @@ def main(
     again: Again = False,
     rows: RowsFile = None,
 ) -> None:
-    """Build datasets and keep their rows."""
+    """Build datasets and record their rows."""
     book, chosen = BOOK.at(rows), names.split(",") if names else [*datasets()]
     known = read_rows(book.path)
     if table:

@@ -1,11 +1,12 @@
-"""Train the games with their presets, print scores of the policies, draw curves.
+"""Train the games with their presets, print scores of the policies, plot curves.
 
     python scripts/reproduce/games.py --seeds 3 --jobs 2 --out runs/games
 
-A run that is there already is not trained again. A score is the share of whole games
-won, a draw counting half (in free_for_all, of four players, a quarter), with 95 %
-intervals; ends alternate. Cooperative games: the mean return of an episode and success,
-of pairs from one seed, of pairs put together from two seeds, and of scripted pairs.
+A run that exists is not trained again. A score is the share of whole games that are
+won, where a draw counts half (a quarter in free_for_all, with four players). Intervals
+are 95 %, and ends alternate. For cooperative games the script prints the mean return of
+an episode and the success, for three kinds of pairs: of one seed, of two seeds, and of
+scripts.
 """
 
 from __future__ import annotations
@@ -54,13 +55,13 @@ def checkpoint(folder: Path, share: float) -> Path:
 
 
 def cpu_minutes(folder: Path) -> float:
-    """Return the CPU-minutes of a run's training."""
+    """Return the CPU-minutes of a run."""
     with (folder / "evaluations.csv").open() as file:
         return float(list(csv.DictReader(file))[-1]["cpu_seconds"]) / 60
 
 
 def competitive_table(game: str, folders: Sequence[Path]) -> Table:
-    """Return scores of each seed against scripts and against its own checkpoint."""
+    """Return the scores of each seed against scripts and against its own checkpoint."""
     names = [*SCRIPTS, "itself at 1/10"]
     table = Table("against", "in training", *[f"seed {i}" for i in range(len(folders))])
     columns = []
@@ -108,7 +109,7 @@ def cooperative_table(game: str, folders: Sequence[Path]) -> Table:
 
 
 def plot_curves(game: str, folders: Sequence[Path], path: Path) -> None:
-    """Draw scores against opponents over CPU-minutes of training, by `plot_iqm`."""
+    """Plot scores against opponents over CPU-minutes of training, by `plot_iqm`."""
     runs = []
     for folder in folders:
         with (folder / "evaluations.csv").open() as file:
@@ -131,12 +132,14 @@ def plot_curves(game: str, folders: Sequence[Path], path: Path) -> None:
 
 
 def main(
-    games: Annotated[str, typer.Option(help="Comma-separated.")] = "duel,rally",
-    seeds: Annotated[int, typer.Option(help="Seeds 0 .. n - 1.")] = 3,
-    jobs: Annotated[int, typer.Option(help="Processes at once.")] = 2,
+    games: Annotated[
+        str, typer.Option(help="Names of games, separated by commas.")
+    ] = "duel,rally",
+    seeds: Annotated[int, typer.Option(help="Number of seeds, from 0.")] = 3,
+    jobs: Annotated[int, typer.Option(help="Number of processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs/games"),
 ) -> None:
-    """Train all games, measure the policies, print tables, draw curves."""
+    """Train all games, measure the policies, print tables and plot curves."""
     console, names = Console(), games.split(",")
     folders = {
         name: [out / f"{name}-{seed}" for seed in range(seeds)] for name in names
@@ -149,7 +152,7 @@ def main(
         ]
         for k, done in enumerate(waiting, 1):
             done.result()
-            print(f"{k} of {len(waiting)} runs are there, in {out}", flush=True)
+            print(f"{k} of {len(waiting)} runs are finished, in {out}", flush=True)
     for name, rows in folders.items():
         console.rule(name)
         if name in COOPERATIVE:

@@ -1,13 +1,13 @@
-"""SAC with hindsight goals in the four tasks with goals, and two variants of it.
+"""Train SAC with hindsight goals in the four tasks with goals, in three variants.
 
     python scripts/reproduce/hindsight.py --tasks reach --variants recorded,relabelled
     python scripts/reproduce/hindsight.py --variants relabelled,tqc
 
-Variants: relabelled (the default), recorded (terminations of the former goals), tqc
-(critics of quantiles, with relabelled terminations).
-A run that ends adds a row to ``docs/data/hindsight.csv``: success of the last policy
-over 500 test seeds, steps, CPU-minutes, and the first evaluation with a success of 0.9.
-A run whose row is there is not trained again, and one that was cut off resumes.
+The variants are relabelled (the default), recorded (terminations of the former goals)
+and tqc (quantile critics, with relabelled terminations). A finished run adds a row to
+``docs/data/hindsight.csv``: success of the last policy over 500 test seeds, steps,
+CPU-minutes, and the steps of the first evaluation with a success of 0.9. A run that has
+a row is not trained again, and an interrupted run is resumed.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ STEPS = {
     "hit_goal": 300_000,
     "hit_goal_velocity": 300_000,
 }
-"""Steps of worlds by task"""
+"""Number of steps, summed over all worlds, by task."""
 VARIANTS: dict[str, dict[str, Any]] = {
     "recorded": {"ends": "recorded"},
     "relabelled": {},
     "tqc": {"critics": "quantiles"},
 }
-"""Settings by the name of a variant"""
+"""Settings by the name of a variant."""
 KEY = ("task", "variant", "seed")
 EPISODES = 500
 
@@ -66,7 +66,7 @@ def train_run(task: str, variant: str, seed: int, folder: Path) -> Row:
 
 
 def order(row: Row) -> tuple[Any, ...]:
-    """Return what rows are sorted by."""
+    """Return the sort key of a row."""
     return list(STEPS).index(row["task"]), row["variant"], int(row["seed"])
 
 
@@ -74,19 +74,23 @@ BOOK = Book(DATA / "hindsight.csv", KEY, order)
 
 
 def main(
-    tasks: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(STEPS),
-    variants: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(
-        VARIANTS
-    ),
-    seeds: Annotated[int, typer.Option(help="Runs of each kind.")] = 1,
-    jobs: Annotated[int, typer.Option(help="Runs at a time.")] = 2,
+    tasks: Annotated[
+        str, typer.Option(help="Names of tasks, separated by commas.")
+    ] = ",".join(STEPS),
+    variants: Annotated[
+        str, typer.Option(help="Names of variants, separated by commas.")
+    ] = ",".join(VARIANTS),
+    seeds: Annotated[
+        int, typer.Option(help="Number of runs of each task and variant.")
+    ] = 1,
+    jobs: Annotated[int, typer.Option(help="Number of runs at a time.")] = 2,
     folder: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path(
         "runs/hindsight"
     ),
     again: Again = False,
     rows: RowsFile = None,
 ) -> None:
-    """Train what has no row yet."""
+    """Train the runs that have no row."""
     cells = [
         (task, variant, seed)
         for seed in range(seeds)

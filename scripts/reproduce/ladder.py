@@ -1,12 +1,15 @@
-"""Pick a ladder of players from checkpoints: each beats the one below, not always.
+"""Select a ladder of players from checkpoints: each beats the one below, not always.
 
     python scripts/reproduce/ladder.py duel runs/games/duel-0/checkpoints/*.npz
 
-They play each other. The strongest ends the ladder; of all ways down from it the one is
-taken whose neighbours score nearest to 0.75, all within 0.65 to 0.85; the league that
-it is taken from stays beside it. The rungs are written as ``<game>_1.npz`` (beginner),
-``<game>_2.npz`` and so on, the strongest as ``<game>.npz``, each with a card; the table
-goes to ``<game>_ladder.csv``.
+The checkpoints play a league. The strongest one is the top of the ladder. Of all
+ladders below it, the script selects the one whose neighbours score nearest to 0.75. All
+scores of neighbours must be within 0.65 to 0.85. The league is saved in the folder of
+the policies.
+
+The rungs are written as ``<game>_1.npz`` (beginner), ``<game>_2.npz`` and so on, and
+the strongest as ``<game>.npz``, each with a card. The table is written to
+``<game>_ladder.csv``.
 """
 
 from __future__ import annotations
@@ -27,14 +30,14 @@ from marl_airhockey.learn.export import export_policy
 from marl_airhockey.policies.load import load_policy
 
 WANTED, WITHIN = 0.75, (0.65, 0.85)
-"""Score of a rung against the one below: nearest to the first, inside the second"""
+"""Target and range of the score of a rung against the one below."""
 
 
 def find_chain(standings: Standings, rungs: int) -> list[int]:
-    """Return the numbers of the players of the best ladder, the weakest first.
+    """Return the indices of the players of the best ladder, the weakest first.
 
     Raises:
-        ValueError: there is none.
+        ValueError: There is no such ladder.
     """
     order = standings.order[::-1]
     top, score = order[-1], standings.score
@@ -47,21 +50,28 @@ def find_chain(standings: Standings, rungs: int) -> list[int]:
         if inside and cost < best:
             best, found = cost, chain
     if not found:
-        raise ValueError(f"no ladder of {rungs} has neighbours within {WITHIN}")
+        raise ValueError(
+            f"no ladder of {rungs} players has scores within {WITHIN}; add checkpoints "
+            "or choose fewer rungs"
+        )
     return found
 
 
 def main(
-    game: Annotated[str, typer.Argument(help="A game with sides.")],
-    checkpoints: Annotated[list[Path], typer.Argument(help="Files of runs.")],
+    game: Annotated[
+        str, typer.Argument(help="Name of a game with teams that play each other.")
+    ],
+    checkpoints: Annotated[list[Path], typer.Argument(help="Paths of checkpoints.")],
     rungs: Annotated[int, typer.Option(help="Number of players.")] = 5,
-    games: Annotated[int, typer.Option(help="Of each pair.")] = 200,
+    games: Annotated[int, typer.Option(help="Number of games of each pair.")] = 200,
     out: Annotated[Path, typer.Option(help="Folder of the policies.")] = Path(
         "runs/ladder"
     ),
-    table: Annotated[Path, typer.Option(help="Folder of the CSV.")] = Path("docs/data"),
+    table: Annotated[Path, typer.Option(help="Folder of the CSV file.")] = Path(
+        "docs/data"
+    ),
 ) -> None:
-    """Play the league, pick the rungs, write them with their cards, print the table."""
+    """Play the league, select the rungs, write them with cards, print the table."""
     players = {str(path): load_policy(path) for path in checkpoints}
     standings = league(game, players, games=games, exact=True)
     standings.save(out)

@@ -1,18 +1,19 @@
-"""MAPPO, IPPO and MADDPG of BenchMARL on the games of teams, and the table of all runs.
+"""Train MAPPO, IPPO and MADDPG of BenchMARL on the games with teams; print a table.
 
     python -m venv .venv-benchmarl
     .venv-benchmarl/bin/pip install torch 'benchmarl==1.5.2' -e .
     .venv-benchmarl/bin/python scripts/reproduce/marl.py --seeds 3
     .venv-benchmarl/bin/python scripts/reproduce/marl.py --seeds 0      # the table
 
-BenchMARL 1.5 wants a TorchRL below 0.12, the extra ``ecosystem`` a later one: so it has
-an environment of its own. BenchMARL is taken as it is: `AirHockey` is a task as its
-documentation asks for, over `ah.make_torchrl`, which steps all worlds at once.
+BenchMARL 1.5 needs a TorchRL below 0.12, and the extra ``ecosystem`` needs a later one.
+It therefore has a separate environment. BenchMARL is not modified. `AirHockey` is a
+task as its documentation describes, over `ah.make_torchrl`, which steps all worlds in
+one call.
 
-All policies of a team share a network; MAPPO's and MADDPG's critics see what no agent
-sees alone. In doubles the team plays against two goalkeepers. Each run that ends adds a
-row to ``docs/data/marl.csv``; one whose row is there is not trained again. A policy is
-measured at the end, by its most likely actions, over episodes it was not trained on.
+All policies of a team share a network. The critics of MAPPO and MADDPG observe the true
+state. In doubles the team plays against two goalkeepers. A finished run adds a row to
+``docs/data/marl.csv``. A run that has a row is not trained again. The final policy is
+measured by its most likely actions, over episodes that training does not use.
 """
 
 from __future__ import annotations
@@ -44,21 +45,21 @@ GAMES: dict[str, dict[str, Any]] = {
     "team_juggle": {},
     "doubles": {"drivers": dict.fromkeys(("paddle_2", "paddle_3"), "goalkeeper")},
 }
-"""Keywords of the environment, by game"""
+"""Keywords of the environment, by game."""
 SCRIPTS = ("striker", "allround")
-"""Drivers that are measured beside what was learned"""
+"""Drivers that are measured for comparison."""
 WORLDS, EPISODES = 100, 500
 FIELDS = ("game", "policy", "seed", "frames", "success", "team_return", "cpu_minutes")
 BOOK = Book(DATA / "marl.csv", FIELDS[:3])
 
 
 class AirHockey(TaskClass):  # type: ignore[misc]
-    """Task of BenchMARL's: worlds of a game, a group for each team, the true state."""
+    """Task of BenchMARL: worlds of a game, a group for each team, the true state."""
 
     def get_env_fun(
         self, num_envs: int, continuous_actions: bool, seed: int | None, device: Any
     ) -> Callable[[], EnvBase]:
-        """Return what builds ``num_envs`` worlds as one environment."""
+        """Return a function that builds ``num_envs`` worlds as one environment."""
 
         def build() -> EnvBase:
             env = ah.make_torchrl(self.name.lower(), num_envs, device, **self.config)
@@ -68,7 +69,7 @@ class AirHockey(TaskClass):  # type: ignore[misc]
         return build
 
     def supports_continuous_actions(self) -> bool:
-        """Return True: actions are velocities."""
+        """Return True, because actions are velocities."""
         return True
 
     def supports_discrete_actions(self) -> bool:
@@ -80,7 +81,7 @@ class AirHockey(TaskClass):  # type: ignore[misc]
         return int(env.world.max_cycles)
 
     def has_render(self, env: EnvBase) -> bool:
-        """Return False, as no pictures are asked for here."""
+        """Return False, because no images are needed."""
         return False
 
     def group_map(self, env: EnvBase) -> dict[str, list[str]]:
@@ -88,13 +89,13 @@ class AirHockey(TaskClass):  # type: ignore[misc]
         return dict(env.group_map)
 
     def observation_spec(self, env: EnvBase) -> Any:
-        """Return the spec of what agents see, without the state."""
+        """Return the spec of the agents' observations, without the state."""
         spec = env.full_observation_spec_unbatched.clone()
         del spec["state"]
         return spec
 
     def info_spec(self, env: EnvBase) -> None:
-        """Return None: nothing else is told."""
+        """Return None, because there are no infos."""
 
     def state_spec(self, env: EnvBase) -> Any:
         """Return the spec of the state, for critics."""
@@ -108,16 +109,16 @@ class AirHockey(TaskClass):  # type: ignore[misc]
         return env.full_action_spec_unbatched
 
     def action_mask_spec(self, env: EnvBase) -> None:
-        """Return None: every action is allowed."""
+        """Return None, because every action is allowed."""
 
     @staticmethod
     def env_name() -> str:
-        """Return the name under which results are filed."""
+        """Return the name of the environment in results."""
         return "marl_airhockey"
 
 
 def settings(frames: int) -> ExperimentConfig:
-    """Return what all runs share: one core, 100 worlds, no logs, no files."""
+    """Return the settings of all runs: one core, 100 worlds, no logs, no files."""
     config = ExperimentConfig.get_from_yaml()
     config.lr, config.share_policy_params = 3e-4, True
     config.on_policy_n_envs_per_worker = config.off_policy_n_envs_per_worker = WORLDS
@@ -134,7 +135,7 @@ def settings(frames: int) -> ExperimentConfig:
 
 
 def measure(experiment: Experiment, game: str) -> tuple[float, float]:
-    """Return the success and the mean return of a team, episodes cut at their end."""
+    """Return the success and the mean return of a team over whole episodes."""
     env = ah.make_torchrl(game, EPISODES, **GAMES[game])
     env.set_seed(TEST_SEED)
     seen = env.reset()
@@ -185,7 +186,7 @@ def play_script(game: str, name: str) -> Row:
 
 
 def print_table(path: Path) -> None:
-    """Print means over seeds, the least and the greatest beside them."""
+    """Print means over seeds, with the smallest and the largest values."""
     headers = "game", "policy", "seeds", "frames", "success", "return", "CPU-min a seed"
     table, rows = Table(*headers), read(path)
     for game, policy in dict.fromkeys((row["game"], row["policy"]) for row in rows):
@@ -198,20 +199,24 @@ def print_table(path: Path) -> None:
 
 
 def spread(values: list[float]) -> str:
-    """Return a mean and, of several values, the least and the greatest."""
+    """Return a mean and, for several values, the smallest and the largest one."""
     mean = sum(values) / len(values)
     ends = f" ({min(values):.2f} .. {max(values):.2f})" if len(values) > 1 else ""
     return f"{mean:.2f}{ends}"
 
 
 def main(
-    games: Annotated[list[str] | None, typer.Argument(help="All by default.")] = None,
-    seeds: Annotated[int, typer.Option(help="Runs of each algorithm.")] = 3,
-    frames: Annotated[int, typer.Option(help="Steps of a world in a run.")] = 500_000,
+    games: Annotated[
+        list[str] | None, typer.Argument(help="Names of games; by default all.")
+    ] = None,
+    seeds: Annotated[int, typer.Option(help="Number of runs of each algorithm.")] = 3,
+    frames: Annotated[
+        int, typer.Option(help="Number of steps of a run, summed over all worlds.")
+    ] = 500_000,
     again: Again = False,
     rows: RowsFile = None,
 ) -> None:
-    """Train what has no row yet, then print the table."""
+    """Train the runs that have no row, then print the table."""
     torch.set_num_threads(1)
     chosen = games or list(GAMES)
     book = BOOK.at(rows)

@@ -1,13 +1,13 @@
-"""Tables and picture of learning from data: the rows of `table.py`, beside the paper.
+"""Print tables or a plot of offline RL, from the rows of `table.py` and the paper.
 
     python scripts/reproduce/offline_tables.py
     python scripts/reproduce/offline_tables.py --plot docs/images/table.png
     python scripts/reproduce/offline_tables.py --domain paper --plot like_for_like.png
 
-RL is that of ``reproduce/tasks.py`` (columns success and arm of ``tasks.csv``), in the
-lab of ``bench/lab_tasks.py``, and under the paper's rules of rows of its own; chance is
-the success of random actions. The paper's figures (arXiv 2405.03113) are of its own
-rules, physics and data.
+The success of RL is from ``reproduce/tasks.py`` (columns success and arm of
+``tasks.csv``), in the lab from ``bench/lab_tasks.py``, and under the paper's rules from
+separate rows. Chance is the success of random actions. The paper's figures (arXiv
+2405.03113) have its own rules, physics and data.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from marl_airhockey.data.benchmark.content import published
 from marl_airhockey.evaluation.stats import interval
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
-"""Folder of the committed rows"""
+"""Folder of the committed rows."""
 Paper = tuple[float | None, float | None, float | None]
 PAPER: dict[str, dict[str, Paper]] = {
     "2d": {
@@ -54,10 +54,11 @@ PAPER: dict[str, dict[str, Paper]] = {
         "puck_velocity": (0.1, 0.3, None),
     },
 }
-"""Success of BC, IQL and RL in the paper by domain and task; None without a figure"""
+"""Success of BC, IQL and RL in the paper, by domain and task; None without a figure."""
 PAPER["paper"] = PAPER["2d"]
 COLUMNS = {"2d": ("success", 2000), "robosuite": ("arm", 200)}
-"""Column of ``tasks.csv`` with the success of RL, and its episodes of each seed"""
+"""Column of ``tasks.csv`` with the success of RL, and the number of episodes per
+seed."""
 ALGOS = ("bc", "bc10", "td3_bc", "iql", "rebrac")
 EXPERT = "expert"
 Row = dict[str, Any]
@@ -72,7 +73,7 @@ def read(name: str) -> list[Row]:
 def success_of(rows: list[Row], *cell: str) -> tuple[float, int] | None:
     """Return the mean success of a domain, tier, task and algorithm, and episodes.
 
-    All seeds play the same episodes.
+    All seeds play the same episodes, so the number of episodes is that of one seed.
     """
     names = ("domain", "tier", "task", "algo")
     own = [row for row in rows if tuple(row[name] for name in names) == cell]
@@ -91,7 +92,7 @@ def chance_of(domain: str, task: str, rows: list[Row]) -> float:
 
 
 def rl_of(domain: str, task: str, rows: list[Row]) -> tuple[float, int] | None:
-    """Return the mean success of RL, and its episodes."""
+    """Return the mean success of RL, and the number of episodes."""
     if domain == "paper":
         return success_of(rows, domain, EXPERT, task, "rl")
     if domain == "lab":
@@ -107,7 +108,7 @@ def rl_of(domain: str, task: str, rows: list[Row]) -> tuple[float, int] | None:
 
 
 def shown(found: tuple[float, int] | None) -> str:
-    """Return a success with its 95 % interval."""
+    """Return a success with its 95 % interval as text."""
     if found is None:
         return "-"
     low, high = interval(*found)
@@ -115,7 +116,7 @@ def shown(found: tuple[float, int] | None) -> str:
 
 
 def table_of(domain: str, rows: list[Row]) -> list[list[str]]:
-    """Return the cells of a domain's table, the header first."""
+    """Return the cells of the table of a domain, header first."""
     found = [["task", "chance", "BC", "IQL", "RL", "paper: BC, IQL, RL"]]
     for task, paper in PAPER[domain].items():
         cells = [success_of(rows, domain, EXPERT, task, a) for a in ("bc", "iql")]
@@ -127,7 +128,7 @@ def table_of(domain: str, rows: list[Row]) -> list[list[str]]:
 
 
 def tier_table(tier: str, rows: list[Row]) -> list[list[str]]:
-    """Return the cells of the table of a tier in 2d, the header first."""
+    """Return the cells of the table of a tier in 2d, header first."""
     tasks = dict.fromkeys(row["task"] for row in rows if row["tier"] == tier)
     return [
         ["task", *ALGOS],
@@ -149,7 +150,7 @@ def tables_of(rows: list[Row]) -> dict[str, list[list[str]]]:
 
 
 def plot(rows: list[Row], path: Path, domain: str) -> None:
-    """Draw our success as bars, the paper's as marks, chance as lines."""
+    """Plot our success as bars, the paper's as marks, and chance as lines."""
     import matplotlib.pyplot as plt
 
     tasks, width = list(PAPER[domain]), 0.26
@@ -179,11 +180,11 @@ def plot(rows: list[Row], path: Path, domain: str) -> None:
 
 def main(
     picture: Annotated[
-        Path | None, typer.Option("--plot", help="Picture to write, PNG.")
+        Path | None, typer.Option("--plot", help="PNG file of the plot.")
     ] = None,
-    domain: Annotated[str, typer.Option(help="Of the picture.")] = "2d",
+    domain: Annotated[str, typer.Option(help="Domain of the plot.")] = "2d",
 ) -> None:
-    """Print the tables in Markdown, or draw the picture."""
+    """Print the tables in Markdown, or write the plot."""
     rows = read("offline.csv")
     if picture is not None:
         plot(rows, picture, domain)

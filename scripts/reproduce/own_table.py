@@ -1,15 +1,15 @@
 """Compare policies that were trained for one table with those trained for all.
 
-    airhockey fit-table play/*.csv --base ur5e ... --out lab.toml  # see docs/teleop.md
+    airhockey fit-table play.csv --base ur5e ... --out lab.toml  # see docs/fitting.md
     python scripts/reproduce/own_table.py lab.toml --lab-seed 3 --tasks juggle
 
-The table is the virtual lab's, whose laws nobody is told but this script: it prints
-them beside the intervals of the profile. It trains policies with the profile and
-with `ur5e`, or goes on with those in the folder, and lets them play on the table as it
-truly is, in simulation; camera and arm are those of the profile, which were measured.
-Differences have 95 % intervals over the seeds of a method and their episodes.
+The table is that of the virtual lab, whose true physics parameters only this script
+reads. It prints them with the intervals of the profile. It trains policies with the
+profile and with `ur5e`, or resumes those in the folder. They play on the true table in
+simulation. Camera and arm are those of the profile, which were measured. Differences
+have 95 % intervals over the seeds of a method and their episodes.
 
-The same policies play in the lab itself, through camera and robot, by
+These commands let the same policies play in the lab, through camera and robot:
 
     airhockey lab --seed 3 &
     airhockey trials lab=runs/own-table/juggle-lab-0 ... ur5e=runs/own-table/... \
@@ -48,17 +48,17 @@ from marl_airhockey.sim.world.keywords import Keywords
 
 OPTIONS = {"table": LabSetup().table}
 EPISODES = 1000
-"""Episodes of each policy"""
+"""Number of episodes of each policy."""
 
 
 def true_laws(lab_seed: int) -> dict[str, float]:
-    """Return the laws of the lab's table, without what senses and moves."""
+    """Return the physics of the lab's table, without sensing and actuation."""
     laws = LabWorld(LabSetup(), lab_seed).laws
     return {k: float(v[0]) for k, v in laws.items() if k not in SIMULATED}
 
 
 def train_one(task: str, profile: str, seed: int, folder: Path) -> Path:
-    """Train a policy, or go on with it, and return its folder."""
+    """Train a policy, or resume it, and return its folder."""
     place = folder / f"{task}-{Path(profile).stem}-{seed}"
     changes = {"profile": profile, "options": OPTIONS, "seed": seed}
     known = (place / "config.toml").exists()
@@ -82,7 +82,7 @@ def play(task: str, runs: list[Path], keywords: Keywords) -> Outcomes:
 
 
 def print_laws(profile: str, laws: dict[str, float]) -> None:
-    """Print what the profile says of each law."""
+    """Print the true value and the range in the profile of each physics parameter."""
     table = Table("law", "true", "profile")
     for name, (low, high) in find_profile(profile).ranges.items():
         if name in laws:
@@ -91,7 +91,7 @@ def print_laws(profile: str, laws: dict[str, float]) -> None:
 
 
 def print_result(task: str, found: Comparison) -> None:
-    """Print the success of both methods, and the difference."""
+    """Print the success and the return of both methods, and the differences."""
     table = Table(task, "success", "return")
     rows: list[tuple[str, Estimates]] = [(row.name, row) for row in found.methods]
     rows += [(f"{gap.first} - {gap.second}", gap) for gap in found.differences]
@@ -109,15 +109,21 @@ def print_result(task: str, found: Comparison) -> None:
 
 def main(
     profile: Annotated[
-        Path, typer.Argument(help="That `airhockey fit-table` has written.")
+        Path, typer.Argument(help="Profile that `airhockey fit-table` wrote.")
     ],
-    lab_seed: Annotated[int, typer.Option(help="Of the lab that was measured.")] = 0,
-    tasks: Annotated[str, typer.Option(help="Separated by commas.")] = "juggle",
-    seeds: Annotated[int, typer.Option(help="Policies of each profile.")] = 5,
-    jobs: Annotated[int, typer.Option(help="Runs at once.")] = 2,
-    folder: Annotated[Path, typer.Option(help="Of the runs.")] = Path("runs/own-table"),
+    lab_seed: Annotated[
+        int, typer.Option(help="Seed of the lab that was measured.")
+    ] = 0,
+    tasks: Annotated[
+        str, typer.Option(help="Names of tasks, separated by commas.")
+    ] = "juggle",
+    seeds: Annotated[int, typer.Option(help="Number of policies of each profile.")] = 5,
+    jobs: Annotated[int, typer.Option(help="Number of runs at a time.")] = 2,
+    folder: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path(
+        "runs/own-table"
+    ),
 ) -> None:
-    """Train, play and print."""
+    """Train and play the policies, and print the results."""
     own, laws = str(profile), true_laws(lab_seed)
     print_laws(own, laws)
     keywords: Keywords = {"profile": own, "options": OPTIONS, "physics": laws}

@@ -1,6 +1,8 @@
-"""Pictures for the docs: every scenario a moment into a scripted episode.
+"""Render images for the docs: every scenario in a scripted episode.
 
-python scripts/reproduce/pictures.py --out docs/images
+    python scripts/reproduce/pictures.py --out docs/images
+
+The script writes ``tasks.png`` and ``games.png``.
 """
 
 from __future__ import annotations
@@ -20,13 +22,13 @@ from marl_airhockey.types import Array
 
 COLUMNS = 2
 MOMENT = 1.9
-"""Time of the picture, s, unless the episode ends before"""
+"""Time of the image, s, unless the episode ends before."""
 WIDE = 1.5
-"""Ratio of length to width below which tables are drawn smaller"""
+"""Ratio of length to width below which tables are rendered smaller."""
 
 
 def moment(name: str, width: int) -> Array:
-    """Return a picture of a scenario with scripted drivers at all seats."""
+    """Return an image of a scenario with scripted drivers at all seats."""
     seats = ah.make_scenario(name).scene.seats
     driver = "allround" if len(seats) > 1 else "striker"
     driver = "reacher" if name.startswith("reach") else driver
@@ -44,12 +46,12 @@ def moment(name: str, width: int) -> Array:
 
 
 def save(path: Path, image: Array) -> None:
-    """Write an image (H, W, 3) into a PNG file."""
+    """Write an image (H, W, 3) as a PNG file."""
     cv2.imwrite(str(path), cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
 
 
 def sheet(pictures: list[Array], width: int) -> Array:
-    """Return one picture of many in rows, on white."""
+    """Return one image with several images in rows, on white."""
     rows = []
     for i in range(0, len(pictures), COLUMNS):
         some = pictures[i : i + COLUMNS]
@@ -62,12 +64,12 @@ def sheet(pictures: list[Array], width: int) -> Array:
 
 
 def main(
-    out: Annotated[Path, typer.Option(help="Folder of the PNGs.")] = Path(
+    out: Annotated[Path, typer.Option(help="Folder of the PNG files.")] = Path(
         "docs/images"
     ),
-    width: Annotated[int, typer.Option(help="Pixels of one scene.")] = 560,
+    width: Annotated[int, typer.Option(help="Width of one image, px.")] = 560,
 ) -> None:
-    """Play all scenarios, draw and save two sheets."""
+    """Play all scenarios, and write one image of the tasks and one of the games."""
     out.mkdir(parents=True, exist_ok=True)
     kinds: dict[str, list[Array]] = {"tasks": [], "games": []}
     for name in ah.scenario_names():

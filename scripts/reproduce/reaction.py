@@ -1,11 +1,12 @@
-"""Play duels at several reactions: who wins, how many are level, goals and shots.
+"""Play duels with several observation latencies: wins, level games, goals and shots.
 
     python scripts/reproduce/reaction.py
     python scripts/reproduce/reaction.py --home zoo/duel --far allround --reactions 0.15
 
-A reaction is the time by which seats see pucks and the other paddle late. Without one a
-keeper that predicts stops everything; with one attack pays. The score is by goals
-alone: a level game, which shots on goal decide, is half a win here.
+A reaction is the latency with which seats observe pucks and the other paddle. Without
+latency, a goalkeeper that predicts stops every shot. With latency, attack leads to
+goals. The score is by goals alone: a level game, which shots on goal decide, counts as
+half a win.
 """
 
 from __future__ import annotations
@@ -34,12 +35,12 @@ def play(
     """Play whole games of two players; return the last cells of their row.
 
     Args:
-        home: player at home.
-        far: the other.
-        reaction: s.
-        games: number of games.
-        control_dt: s.
-        width: of the goals, m.
+        home: Name of the driver at home.
+        far: Name of the driver at the far end.
+        reaction: Observation latency, s.
+        games: Number of games.
+        control_dt: Time between two actions, s.
+        width: Width of the goals, m.
     """
     world = ah.make_world(
         "duel",
@@ -78,19 +79,23 @@ def play(
 
 
 def main(
-    reactions: Annotated[str, typer.Option(help="s, comma-separated.")] = (
-        "0,0.05,0.1,0.15,0.2"
-    ),
-    home: Annotated[list[str], typer.Option(help="Player at home, repeatable.")] = HOME,
-    far: Annotated[list[str], typer.Option(help="The other, as often.")] = FAR,
-    games: Annotated[int, typer.Option(help="Games of each pair.")] = 200,
-    control_dt: Annotated[float, typer.Option(help="s")] = 0.05,
+    reactions: Annotated[
+        str, typer.Option(help="Latencies, s, separated by commas.")
+    ] = ("0,0.05,0.1,0.15,0.2"),
+    home: Annotated[list[str], typer.Option(help="Driver at home, repeatable.")] = HOME,
+    far: Annotated[
+        list[str], typer.Option(help="Driver at the far end, one for each --home.")
+    ] = FAR,
+    games: Annotated[int, typer.Option(help="Number of games of each pair.")] = 200,
+    control_dt: Annotated[
+        float, typer.Option(help="Time between two actions, s.")
+    ] = 0.05,
     width: Annotated[float, typer.Option(help="Width of the goals, m.")] = 0.30,
 ) -> None:
     """Print a row for each reaction and pair of players."""
     if len(home) != len(far):
         raise typer.BadParameter(
-            f"{len(far)} for {len(home)} of --home", param_hint="--far"
+            f"{len(far)} given, but {len(home)} of --home", param_hint="--far"
         )
     table = Table(
         "reaction, s",
@@ -99,9 +104,9 @@ def main(
         "score",
         "level",
         "goals",
-        "goals a minute",
-        "goals a shot",
-        "of them banks",
+        "goals per minute",
+        "goals per shot",
+        "bank shots",
     )
     for reaction in map(float, reactions.split(",")):
         for players in zip(home, far, strict=True):

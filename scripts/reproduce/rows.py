@@ -16,17 +16,18 @@ import typer
 Row = dict[str, Any]
 Cell = tuple[Any, ...]
 DATA = Path(__file__).parents[2] / "docs" / "data"
-"""Folder of the committed rows"""
+"""Folder of the committed rows."""
 Again = Annotated[
-    bool, typer.Option("--again", help="Compute what has a row, too, in new folders.")
+    bool, typer.Option("--again", help="Compute existing rows again, in new folders.")
 ]
 RowsFile = Annotated[
-    Path | None, typer.Option("--rows", help="File of the rows instead of docs/data.")
+    Path | None,
+    typer.Option("--rows", help="CSV file of the rows, instead of that in docs/data."),
 ]
 
 
 def read(path: Path) -> list[Row]:
-    """Return the rows of a CSV file; none if there is no file."""
+    """Return the rows of a CSV file; an empty list if there is no file."""
     if not path.exists():
         return []
     with path.open(newline="") as file:
@@ -34,7 +35,7 @@ def read(path: Path) -> list[Row]:
 
 
 def write(path: Path, rows: Sequence[Row]) -> None:
-    """Replace a CSV file as a whole."""
+    """Replace a CSV file atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".part")
     with draft.open("w", newline="") as file:
@@ -45,7 +46,7 @@ def write(path: Path, rows: Sequence[Row]) -> None:
 
 
 def run_folder(folder: Path, again: bool) -> Path:
-    """Return the folder of runs; those of ``--again`` have one of their own."""
+    """Return the folder of runs; with ``--again`` it is a separate one."""
     return folder / "again" if again else folder
 
 
@@ -55,9 +56,9 @@ class Book:
 
     Args:
         path: Path of the file.
-        key: Columns that name a cell.
-        order: Function of a row, all strings, that returns what it is sorted by; None
-            keeps the order of the file.
+        key: Columns that identify a cell.
+        order: Function that returns the sort key of a row, whose values are strings;
+            None for the order of the file.
     """
 
     path: Path
@@ -65,14 +66,14 @@ class Book:
     order: Callable[[Row], Any] | None = None
 
     def at(self, path: Path | None) -> Book:
-        """Return the same for another file, if one is given."""
+        """Return the same book for another file, if one is given."""
         return Book(path, self.key, self.order) if path else self
 
     def _cell(self, row: Row) -> tuple[str, ...]:
         return tuple(str(row[name]) for name in self.key)
 
     def keep(self, row: Row) -> None:
-        """Add a row, in place of that of the same cell."""
+        """Add a row, or replace the row of the same cell."""
         new = {name: str(value) for name, value in row.items()}
         rows = read(self.path)
         cells = [self._cell(old) for old in rows]
@@ -83,11 +84,11 @@ class Book:
         write(self.path, sorted(rows, key=self.order) if self.order else rows)
 
     def missing(self, cells: Sequence[Cell], again: bool = False) -> list[Cell]:
-        """Return the cells to compute; print how many rows are there.
+        """Return the cells to compute; print the number of existing rows.
 
         Args:
-            cells: Cells that are wanted.
-            again: Whether those with a row are to be computed, too.
+            cells: All requested cells.
+            again: True to also compute cells that have a row.
         """
         known = {self._cell(row) for row in read(self.path)}
         there = [cell for cell in cells if tuple(map(str, cell)) in known]
@@ -96,7 +97,10 @@ class Book:
         for cell in wanted:
             print("  to compute:", " ".join(map(str, cell)), flush=True)
         if not wanted:
-            print("nothing to compute; --again does, --rows FILE keeps it elsewhere")
+            print(
+                "nothing to compute; --again computes the rows again, --rows FILE "
+                "writes them to another file"
+            )
         return wanted
 
     def fill(
@@ -106,13 +110,13 @@ class Book:
         jobs: int,
         kept: Callable[[Any], None] | None = None,
     ) -> None:
-        """Compute cells in processes of their own, keep and print each row at once.
+        """Compute cells in separate processes; save and print each row immediately.
 
         Args:
-            cells: Cells; what names one is what ``work`` is called with.
+            cells: Cells, whose elements are the arguments of ``work``.
             work: Function that returns the row of a cell.
-            jobs: Cells at a time.
-            kept: Function that keeps what ``work`` returns, if that is a tuple that
+            jobs: Number of cells at a time.
+            kept: Function that saves the result of ``work``, if it is a tuple that
                 begins with a row.
         """
         began = time.monotonic()
@@ -128,7 +132,7 @@ class Book:
                         f"{k} of {len(cells)}, {minutes:.1f} min: {shown}", flush=True
                     )
             except BaseException:
-                # What has ended is kept; do not wait for all the others.
+                # Finished rows are saved; do not wait for the others.
                 pool.shutdown(cancel_futures=True)
                 raise
 
@@ -141,7 +145,7 @@ def compute(
     jobs: int,
     again: bool,
 ) -> None:
-    """Compute the cells of a book that are missing; ``work`` takes a folder as well."""
+    """Compute the missing cells of a book; ``work`` also takes a folder."""
     place = run_folder(folder, again)
     book.fill(book.missing(cells, again), partial(in_folder, work, place), jobs)
 

@@ -1,11 +1,11 @@
-"""Coverage of the intervals of a study's report, by simulated studies.
+"""Measure the coverage of the intervals of a study's report, by simulated studies.
 
     python scripts/reproduce/study_intervals.py --studies 500
 
-Each study has 24 participants of different skill, who play three games against each of
-three opponents and answer a question. Participants and opponents of all studies come
-from the same distributions, of which the truth is known: how often do the report's
-intervals of score and answer contain it?
+Each study has 24 participants of different skill. They play three games against each of
+three opponents and answer a question. Participants and opponents of all studies have
+the same distributions, whose true means are known. The script prints how often the
+report's intervals of score and answer contain them.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from marl_airhockey.types import Array
 
 PARTICIPANTS, GAMES_EACH = 24, 3
 STRENGTHS = {"weak": -1.0, "even": 0.0, "strong": 1.2}
-"""Strength of each opponent, logits"""
+"""Strength of each opponent, logits."""
 SPREAD = 1.0
-"""Standard deviation of participants' skills, logits"""
+"""Standard deviation of the participants' skills, logits."""
 DRAWS = 0.15
-"""Share of draws"""
+"""Share of draws."""
 
 
 def points(skill: Array, strength: float, rng: np.random.Generator) -> Array:
-    """Return points of games (n, `GAMES_EACH`) of people of skills (n,)."""
+    """Return points of games (n, `GAMES_EACH`) of people with skills (n,)."""
     win = (1.0 - DRAWS) / (1.0 + np.exp(strength - skill))
     chance = rng.random((len(skill), GAMES_EACH))
     drawn = 0.5 * (chance < win[:, None] + DRAWS)
@@ -37,7 +37,7 @@ def points(skill: Array, strength: float, rng: np.random.Generator) -> Array:
 
 
 def answers(skill: Array, strength: float, rng: np.random.Generator) -> Array:
-    """Return answers (n,) of 1 to 7 of people of skills (n,)."""
+    """Return answers (n,), 1 to 7, of people with skills (n,)."""
     felt = 4.0 + 0.8 * skill - 0.7 * strength + rng.normal(0.0, 1.0, len(skill))
     return np.clip(np.round(felt), 1.0, 7.0)
 
@@ -62,7 +62,7 @@ def simulated(rng: np.random.Generator) -> Answers:
 
 
 def truth() -> dict[str, tuple[float, float]]:
-    """Return mean score and mean answer against each opponent, of all people."""
+    """Return the true mean score and mean answer against each opponent."""
     rng = np.random.default_rng(0)
     skill = rng.normal(0.0, SPREAD, 2_000_000)
     return {
@@ -90,7 +90,7 @@ def coverage(studies: int, seed: int = 1) -> dict[str, float]:
 
 
 def main(
-    studies: Annotated[int, typer.Option(help="Simulated studies.")] = 500,
+    studies: Annotated[int, typer.Option(help="Number of simulated studies.")] = 500,
 ) -> None:
     """Print the coverage."""
     for name, share in coverage(studies).items():

@@ -1,4 +1,4 @@
-"""The paper's Table I as one command: BC, IQL and RL in three domains.
+"""Compute the paper's Table I with one command: BC, IQL and RL in three domains.
 
     python scripts/reproduce/table.py --seeds 3 --jobs 2
     python scripts/reproduce/table.py --domain lab --jobs 1     # on an idle machine
@@ -6,20 +6,21 @@
     python scripts/reproduce/table.py --domain paper --algos random,rl --seeds 3
     python scripts/reproduce/table.py --domain paper --seeds 1
 
-BC and IQL learn from 100,000 steps of an expert, 20,000 and 40,000 steps of the
-gradient. A cell that ends adds a row to ``docs/data/offline.csv``; one whose row is
-there is not trained again, so the script can be stopped and started. ``--again --rows
-mine.csv`` trains all and keeps the rows elsewhere.
+BC and IQL learn from 100,000 steps of an expert, with 20,000 and 40,000 gradient steps.
+A finished cell adds a row to ``docs/data/offline.csv``. A cell that has a row is not
+trained again, so the script can be interrupted. ``--again --rows mine.csv`` trains all
+cells and writes the rows to another file.
 
-* 2d: data are ``airhockey/TASK/expert-v0``, or of another tier; 500 episodes on numba.
-* robosuite: data are of the zoo's policy on robosuite; 50 episodes there.
-* lab: data are of ``zoo/TASK_full_size`` in the profile ur5e; 20 episodes through the
-  camera and the arm of the virtual lab.
-* paper: rules, table and physics of the paper's code; data are of seed 0 of rl, which
-  is PPO with the presets; random are random actions.
+* 2d: the data are ``airhockey/TASK/expert-v0``, or of another tier; 500 episodes on
+  numba.
+* robosuite: the data are of the zoo's policy on robosuite; 50 episodes on robosuite.
+* lab: the data are of ``zoo/TASK_full_size`` in the profile ur5e; 20 episodes through
+  the camera and the arm of the virtual lab.
+* paper: rules, table and physics of the paper's code. The data are of seed 0 of rl,
+  which is PPO with the presets; random are random actions.
 
-No seed of an evaluation is that of a recording. ``offline_tables.py`` prints the
-tables of these rows.
+Evaluations and recordings have different seeds. ``offline_tables.py`` prints the tables
+of these rows.
 """
 
 from __future__ import annotations
@@ -54,12 +55,13 @@ ALGOS: dict[str, tuple[str, dict[str, Any]]] = {
     "iql": ("iql", {"total_steps": 40_000}),
     "rebrac": ("rebrac", {"total_steps": 40_000}),
 }
-"""Algorithms and their settings by column; bc10 clones the best tenth of episodes"""
+"""Algorithms and their settings by column. bc10 clones the best tenth of the
+episodes."""
 COLUMNS = ("random", *ALGOS, "rl")
-"""Names of the columns of a table, which rows belong to"""
+"""Names of the columns of a table, to which rows belong."""
 EXPERT = "expert"
 SEED = 10_000_000
-"""Seed of the first recorded episode, far from those of evaluations"""
+"""Seed of the first recorded episode, which no evaluation uses."""
 FIELDS = (
     *("domain", "tier", "task", "algo", "seed", "success", "return", "episodes"),
     *("steps", "cpu_minutes"),
@@ -72,13 +74,13 @@ class Domain:
 
     tasks: tuple[str, ...]
     record: Callable[[str, str, Path], Path]
-    """Function of a task, a tier and a folder that returns recordings"""
+    """Function of a task, a tier and a folder that returns recordings."""
     measure: Callable[[Driver, str], EvaluationResult]
-    """Function that evaluates a policy in a task"""
+    """Function that evaluates a policy in a task."""
 
 
 def _recorded(player: str, task: str, steps: int, folder: Path, env: Keywords) -> Path:
-    """Return recordings of a policy, made now if they are not there."""
+    """Return recordings of a policy, which are made if they do not exist."""
     if not folder.exists():
         record_steps(make_driver(player), player, task, steps, folder, SEED, env)
     return folder
@@ -100,8 +102,8 @@ def _through_the_lab(policy: Driver, task: str) -> EvaluationResult:
 def paper_environment(task: str) -> Keywords:
     """Return rules, table and physics of the paper's code.
 
-    Its paddles have their half of the table and reach 2 m/s within a step; here they
-    need two. Strikes are on the level.
+    In the paper's code, paddles have their half of the table and reach 2 m/s within one
+    step. Here they need two steps. Strikes have a level table.
     """
     paddle = {"paddle_speed": 2.0, "paddle_acceleration": 20.0}
     level = {"tilt": 0.0} if task.startswith("strike") else {}
@@ -121,7 +123,7 @@ def _of_rl(task: str, tier: str, folder: Path) -> Path:
 
 
 def train_rl(task: str, seed: int, folder: Path) -> Path:
-    """Train PPO under the paper's rules, if that is not done; return its folder."""
+    """Train PPO under the paper's rules, unless it is trained; return its folder."""
     place = folder / f"paper-{task}-rl-{seed}"
     config = preset(task, {**paper_environment(task), "seed": seed})
     run_training(None if (place / "config.toml").exists() else config, place)
@@ -164,7 +166,7 @@ DOMAINS = {
     ),
     "paper": Domain(TASKS, _of_rl, _by_the_paper),
 }
-"""Domains by name: tasks, recordings and evaluation"""
+"""Domains by name: tasks, recordings and evaluation."""
 
 
 def train_cell(
@@ -193,7 +195,7 @@ def train_cell(
 
 
 def learn(data: Path, column: str, seed: int, place: Path) -> None:
-    """Train a column's algorithm from recordings into a folder, or go on with it."""
+    """Train the algorithm of a column from recordings into a folder, or resume it."""
     algo, settings = ALGOS[column]
     changes = {"seed": seed, "evaluations": 1, "eval_episodes": 50, **settings}
     config = offline_config(algo, [data], changes)
@@ -201,7 +203,7 @@ def learn(data: Path, column: str, seed: int, place: Path) -> None:
 
 
 def order(row: Row) -> tuple[Any, ...]:
-    """Return what rows are sorted by."""
+    """Return the sort key of a row."""
     return (
         list(DOMAINS).index(row["domain"]),
         row["tier"],
@@ -215,19 +217,25 @@ BOOK = Book(DATA / "offline.csv", ("domain", "tier", "task", "algo", "seed"), or
 
 
 def main(
-    domain: Annotated[str, typer.Option(help="2d, robosuite, lab or paper.")] = "2d",
-    tier: Annotated[str, typer.Option(help="Tier of the datasets of 2d.")] = EXPERT,
-    tasks: Annotated[str, typer.Option(help="Comma-separated; all of them.")] = "",
-    algos: Annotated[str, typer.Option(help="Comma-separated.")] = "bc,iql",
-    seeds: Annotated[int, typer.Option(help="Runs of each cell.")] = 3,
-    jobs: Annotated[int, typer.Option(help="Cells at a time.")] = 2,
+    domain: Annotated[
+        str, typer.Option(help="Name of the domain: 2d, robosuite, lab or paper.")
+    ] = "2d",
+    tier: Annotated[str, typer.Option(help="Tier of the datasets in 2d.")] = EXPERT,
+    tasks: Annotated[
+        str, typer.Option(help="Names of tasks, separated by commas; by default all.")
+    ] = "",
+    algos: Annotated[
+        str, typer.Option(help="Names of algorithms, separated by commas.")
+    ] = "bc,iql",
+    seeds: Annotated[int, typer.Option(help="Number of runs of each cell.")] = 3,
+    jobs: Annotated[int, typer.Option(help="Number of cells at a time.")] = 2,
     folder: Annotated[Path, typer.Option(help="Folder of data and runs.")] = Path(
         "runs/table"
     ),
     again: Again = False,
     rows: RowsFile = None,
 ) -> None:
-    """Train what has no row yet."""
+    """Train the cells that have no row."""
     chosen = tasks.split(",") if tasks else DOMAINS[domain].tasks
     book, place = BOOK.at(rows), run_folder(folder, again)
     cells = [
@@ -238,7 +246,7 @@ def main(
     ]
     wanted = book.missing(cells, again)
     learners = {cell[2] for cell in wanted if cell[3] in ALGOS}
-    for task in sorted(learners, key=TASKS.index):  # Once, not in each process.
+    for task in sorted(learners, key=TASKS.index):  # Record once, for all processes.
         print(f"data of {task}", flush=True)
         DOMAINS[domain].record(task, tier, place)
     book.fill(wanted, partial(in_folder, train_cell, place), jobs)

@@ -1,13 +1,13 @@
-"""Print the tables of the ten tasks from the rows that `tasks.py` keeps.
+"""Print the tables of the ten tasks from the rows of `tasks.py`.
 
     python scripts/reproduce/task_tables.py --markdown ideal.md --curves curves.png
     python scripts/reproduce/task_tables.py --profile ur5e --markdown ur5e.md
 
-Means over the seeds there are, which play the same episodes: in an interval these count
-once. "Blind" is the best controller that does not see the
-goal, from ``docs/data/blind.csv``; still, random and sticky are played here. The
-paper's column is the row of Table I for RL in its 2D simulator (arXiv 2405.03113),
-under the paper's own rules and physics.
+Values are means over the seeds. All seeds play the same episodes, so an interval counts
+each episode once. "Blind" is the best controller that does not observe the goal, from
+``docs/data/blind.csv``. The script evaluates still, random and sticky. The paper's
+column is the row of Table I for RL in its 2D simulator (arXiv 2405.03113), with the
+paper's own rules and physics.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ PAPER = dict.fromkeys(TASKS, 1.0) | {
     "hit_goal": 0.9,
     "hit_goal_velocity": 0.0,
 }
-"""Success of RL in the paper, by task"""
+"""Success of RL in the paper, by task."""
 NONE = "-"
 Tables = dict[str, list[Row]]
-"""Rows of each table, by its title; the keys of a row are the columns"""
+"""Rows of each table, by its title. The keys of a row are the columns."""
 
 
 def of(rows: Rows, task: str, profile: str, variant: str = "") -> Rows:
@@ -46,12 +46,12 @@ def of(rows: Rows, task: str, profile: str, variant: str = "") -> Rows:
 
 
 def mean(rows: Rows, column: str) -> str:
-    """Return the mean of a column, "-" without rows."""
+    """Return the mean of a column; "-" without rows."""
     return f"{np.mean([float(row[column]) for row in rows]):.3f}" if rows else NONE
 
 
 def baseline(agent: str, task: str, profile: str) -> str:
-    """Return the success of a driver without skill."""
+    """Return the success of a baseline driver."""
     keywords = config_of(task, profile, "", 0).keywords
     driver = make_driver(agent)
     found = evaluate(
@@ -95,7 +95,7 @@ def conditions_of(task: str, profile: str, rows: Rows) -> Row:
 
 
 def cost_of(task: str, profile: str, rows: Rows) -> Row:
-    """Return the row of the table of what training costs."""
+    """Return the row of the table of the cost of training."""
     mine = of(rows, task, profile)
     steps = np.mean([float(row["steps"]) for row in mine]) / 1e6
     minutes = np.mean([float(row["cpu_minutes"]) for row in mine])
@@ -131,11 +131,15 @@ def curves_of(points: Rows, task: str, profile: str) -> list[Rows]:
 
 
 def main(
-    profile: Annotated[str, typer.Option(help="ideal, ur5e, gantry.")] = "ideal",
-    markdown: Annotated[Path | None, typer.Option(help="File of the tables.")] = None,
-    curves: Annotated[Path | None, typer.Option(help="Picture of the curves.")] = None,
+    profile: Annotated[
+        str, typer.Option(help="Name of the profile: ideal, ur5e or gantry.")
+    ] = "ideal",
+    markdown: Annotated[
+        Path | None, typer.Option(help="Markdown file of the tables.")
+    ] = None,
+    curves: Annotated[Path | None, typer.Option(help="PNG file of the curves.")] = None,
 ) -> None:
-    """Print the tables, write them, and draw the learning curves."""
+    """Print the tables, write them, and plot the learning curves."""
     tables = tables_of(profile)
     for title, rows in tables.items():
         shown = Table(*rows[0], title=f"{title}, profile {profile}")

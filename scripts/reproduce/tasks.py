@@ -1,20 +1,21 @@
-"""Train every task with its preset over several seeds, keep the rows.
+"""Train every task with its preset over several seeds and save the rows.
 
     python scripts/reproduce/tasks.py --seeds 5 --jobs 2
     python scripts/reproduce/tasks.py --profile ur5e --seeds 5 --jobs 2
     python scripts/reproduce/tasks.py --profile ur5e --variant truth --seeds 2
     python scripts/reproduce/tasks.py --profile ur5e --variant 60hz --tasks juggle
 
-Each run that ends adds a row to ``docs/data/tasks.csv`` and its curve to
-``docs/data/curves.csv``. A run whose row is there is not trained again, unless its
-settings have changed since, so the script can be stopped and started; ``--again``
-trains all, as after a change of physics or rules, and ``--rows FILE`` keeps the rows
-elsewhere. `task_tables.py` prints the tables of these rows.
+A finished run adds a row to ``docs/data/tasks.csv`` and its curve to
+``docs/data/curves.csv``. A run that has a row is not trained again unless its settings
+have changed, so the script can be interrupted. ``--again`` trains all runs, for example
+after a change of physics or rules. ``--rows FILE`` writes the rows to another file.
+`task_tables.py` prints the tables of these rows.
 
-Success is that of the last policy (no checkpoint is picked) over the test seeds, which
-training never sees: on the numba backend that it was trained on, on pymunk, with the
-arm of robosuite, and with one control step more of action delay. The variant "truth"
-has a profile's physics and servo but observes the true state: what sensing costs.
+Success is that of the last policy, without selection of a checkpoint, over the test
+seeds, which training never uses. It is measured on the numba backend of the training,
+on pymunk, with the arm of robosuite, and with an additional action latency of one
+control step. The variant "truth" has the physics and the servo of a profile but
+observes the true state. It shows the cost of sensing.
 """
 
 from __future__ import annotations
@@ -37,39 +38,39 @@ from marl_airhockey.sim.sensing.simulated_camera import SENSED
 from marl_airhockey.sim.world.keywords import Keywords
 
 EPISODES, SLOW_EPISODES = 2000, 200
-"""Episodes by which a policy is measured, and on the slower backends"""
+"""Number of episodes that measure a policy, and of those on the slower backends."""
 THRESHOLDS = (0.5, 0.9, 0.95)
-"""Levels of success to which the CPU time is reported"""
+"""Levels of success for which the CPU time is reported."""
 VARIANTS: dict[str, dict[str, Any]] = {
     "": {},
     "truth": {"observe": "velocity", "physics": dict.fromkeys(SENSED, 0.0)},
     # The same horizon and the same time in a rollout as at 20 Hz.
     "60hz": {"control_dt": 1 / 60, "gamma": 0.9967, "gae_lambda": 0.983, "n_steps": 96},
 }
-"""Settings that replace a preset's, by the name of the variant"""
+"""Settings that replace those of a preset, by the name of the variant."""
 KEY = ("task", "profile", "variant", "seed")
 CURVE = {
     "steps": "steps",
     "cpu_seconds": "learning_cpu_seconds",
     "success": "success",
 }
-"""Columns of the committed curves, and of a run's ``evaluations.csv``"""
+"""Columns of the committed curves, and of the ``evaluations.csv`` of a run."""
 Rows = list[Row]
 
 
 def config_of(task: str, profile: str, variant: str, seed: int) -> PPOConfig:
-    """Return the preset of a task in a profile, with what a variant changes."""
+    """Return the preset of a task in a profile, with the changes of a variant."""
     changes = {"profile": profile, "seed": seed, **VARIANTS[variant]}
-    if variant == "truth":  # Nothing is sensed, so the preset is that of ideal.
+    if variant == "truth":  # There is no sensing, so the preset is that of ideal.
         return dataclasses.replace(preset(task), **changes)
     return preset(task, changes)
 
 
 def recipe(config: PPOConfig) -> str:
-    """Return a short name of all settings but the seed.
+    """Return a short name of all settings except the seed.
 
-    Those at their defaults are left out, so that neither another setting nor another
-    default of one that does not matter here changes a name.
+    Settings with their default are omitted. New settings and new defaults of unused
+    settings therefore do not change the name.
     """
     usual = {f.name: _default(f) for f in dataclasses.fields(config)}
     settings = {
@@ -91,12 +92,12 @@ def train_seed(
     """Train one seed, measure its last policy; return its row and those of its curve.
 
     Args:
-        folder: Folder of all runs; one that was cut off is gone on with.
-        task: Task.
-        profile: Profile.
-        variant: Name of what it changes.
-        seed: Seed.
-        name: Name of its settings, see `recipe`.
+        folder: Folder of all runs. An interrupted run is resumed.
+        task: Name of the task.
+        profile: Name of the profile.
+        variant: Name of the variant.
+        seed: Seed of the run.
+        name: Name of the settings, see `recipe`.
     """
     config = config_of(task, profile, variant, seed)
     folder /= "-".join(filter(None, (task, profile, variant, str(seed), name)))
@@ -119,7 +120,7 @@ def train_seed(
 
 
 def measure(config: PPOConfig, folder: Path) -> Row:
-    """Return the success of a run's last policy in all cases, by the column's name."""
+    """Return the success of the last policy of a run in all cases, by column."""
     usual = config.keywords
     late: Keywords = {
         **usual,
@@ -153,30 +154,35 @@ BOOK = Book(DATA / "tasks.csv", (*KEY, "recipe"))
 
 
 def run_of(row: Row) -> tuple[str, ...]:
-    """Return what tells the runs of rows apart."""
+    """Return the values that identify the run of a row."""
     return tuple(str(row[name]) for name in KEY)
 
 
 def keep(path: Path, new: Rows) -> None:
-    """Put rows into a file in place of those of the same runs, in order."""
+    """Write rows into a file in place of those of the same runs, in order."""
     runs = {run_of(row) for row in new}
     rows = [row for row in read(path) if run_of(row) not in runs] + new
-    write(path, sorted(rows, key=run_of))  # Stable: a curve's points stay in order.
+    # The sort is stable, so the points of a curve stay in order.
+    write(path, sorted(rows, key=run_of))
 
 
 def main(
-    tasks: Annotated[str, typer.Option(help="Comma-separated tasks.")] = ",".join(
-        TASKS
-    ),
+    tasks: Annotated[
+        str, typer.Option(help="Names of tasks, separated by commas.")
+    ] = ",".join(TASKS),
     seeds: Annotated[int, typer.Option(help="Number of seeds, from 0.")] = 5,
-    profile: Annotated[str, typer.Option(help="ideal, ur5e, gantry.")] = "ideal",
-    variant: Annotated[str, typer.Option(help="None, truth or 60hz.")] = "",
+    profile: Annotated[
+        str, typer.Option(help="Name of the profile: ideal, ur5e or gantry.")
+    ] = "ideal",
+    variant: Annotated[
+        str, typer.Option(help="Name of the variant: truth, 60hz, or none by default.")
+    ] = "",
     jobs: Annotated[int, typer.Option(help="Number of processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs/tasks"),
     again: Again = False,
     rows: RowsFile = None,
 ) -> None:
-    """Train tasks and keep their rows, and their curves beside them."""
+    """Train tasks and save their rows and curves."""
     book = BOOK.at(rows)
     runs = [(n, profile, variant, s) for s in range(seeds) for n in tasks.split(",")]
     cells = [(*run, recipe(config_of(*run))) for run in runs]

@@ -1,10 +1,11 @@
-"""Success of the zoo's policies of the tasks, over episodes that picked none of them.
+"""Measure the success of the zoo's policies of the tasks, over independent episodes.
 
     python scripts/reproduce/zoo.py
     python scripts/reproduce/zoo.py --again --rows mine.csv
 
-Each policy plays 2000 test episodes in what it was trained in, by its mean actions. The
-zoo's policies are of other runs than those of ``tasks.py``.
+No policy was selected by these episodes. Each policy plays 2000 test episodes in the
+environment of its training, with its mean actions. The policies of the zoo are from
+other runs than those of ``tasks.py``.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from marl_airhockey.policies.load import ZOO
 
 EPISODES = 2000
 PROFILES = {"": "ideal", "_ur5e": "ur5e", "_full_size": "ur5e, the lab's table"}
-"""Ends of names, and what these policies were trained in"""
+"""Ends of the names of policies, and the environment of their training."""
 BOOK = Book(DATA / "zoo.csv", ("policy",))
 
 
@@ -36,7 +37,7 @@ def measure(name: str) -> Row:
 
 
 def main(
-    jobs: Annotated[int, typer.Option(help="Policies at a time.")] = 1,
+    jobs: Annotated[int, typer.Option(help="Number of policies at a time.")] = 1,
     again: Again = False,
     rows: RowsFile = None,
 ) -> None:

@@ -1,8 +1,8 @@
-"""A first tour in five minutes: look, compare, train, measure, record, film.
+"""First tour in five minutes: look, compare, train, measure, record, write a video.
 
     python scripts/tutorials/first_hour.py --out runs/first-hour
 
-Each step prints what it does and what came of it. It needs the extras train and data.
+Each step prints its purpose and its result. The script needs the extras train and data.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from marl_airhockey.rollouts.watch import write_replay
 
 
 def look() -> None:
-    """Make tasks by three doors."""
-    print("\n== One task by gymnasium, a game by PettingZoo, 1024 worlds at a time")
+    """Create environments with three APIs."""
+    print("\n== A task with Gymnasium, a game with PettingZoo, a batch of 1024 worlds")
     env = gymnasium.make("marl_airhockey/Juggle-v0")
     seen, _ = env.reset(seed=0)
     labels = env.get_wrapper_attr("observation_labels")
@@ -42,20 +42,20 @@ def look() -> None:
     for _ in range(200):
         world.step(still)
     rate = 200 * 1024 / (time.perf_counter() - began)
-    print(f"{rate:,.0f} steps of a world in a second")
+    print(f"{rate:,.0f} world-steps per second")
 
 
 def compare() -> None:
-    """Measure what needs no training."""
-    print("\n== What luck, a script and a trained policy are worth in juggle")
+    """Measure drivers without training."""
+    print("\n== Success of random actions, a script and a trained policy in juggle")
     for player in ("random", "striker", "zoo/juggle"):
         found = ah.evaluate(player, "juggle", episodes=200)
         print(f"{player:12s} success {found.success:.3f}, return {found.returns:.2f}")
 
 
 def train(folder: Path) -> Path:
-    """Train a policy, and measure it on two engines; return its run."""
-    print("\n== Train touch, then play it on two engines")
+    """Train a policy and measure it on two backends; return the folder of the run."""
+    print("\n== Train touch, then measure it on two backends")
     result = ah.train("touch", folder / "touch", total_steps=500_000)
     print(f"{result.steps:,} steps, {result.folder}")
     for backend in ("numba", "pymunk"):
@@ -66,8 +66,8 @@ def train(folder: Path) -> Path:
 
 
 def keep(run: Path, folder: Path) -> None:
-    """Record what a policy does, and film it."""
-    print("\n== Record 20 episodes, and film the first")
+    """Record episodes of a policy and write a video of the first one."""
+    print("\n== Record 20 episodes, and write a video of the first one")
     policy, path = ah.load_policy(run), folder / "recording"
     record_episodes(policy, "mine", "touch", 20, path, 0, {})
     steps = sum(len(episode) for episode in read_recording(path).episodes)
@@ -76,17 +76,18 @@ def keep(run: Path, folder: Path) -> None:
 
 
 def main(
-    out: Annotated[Path, typer.Option(help="New folder of all that is made.")] = Path(
+    out: Annotated[Path, typer.Option(help="New folder of all files.")] = Path(
         "runs/first-hour"
     ),
 ) -> None:
-    """Do all steps."""
+    """Run all steps."""
     began = time.perf_counter()
     look()
     compare()
     keep(train(out), out)
     print(
-        f"\n{time.perf_counter() - began:.0f} s. Next: docs/own.md; airhockey play duel"
+        f"\n{time.perf_counter() - began:.0f} s. "
+        "Next: docs/own_task.md; airhockey play duel"
     )
 
 

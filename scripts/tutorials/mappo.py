@@ -1,9 +1,10 @@
-"""MAPPO in one file: teammates share a policy, and a critic sees the true state.
+"""MAPPO in one file: teammates share a policy, and a critic observes the true state.
 
     python scripts/tutorials/mappo.py --updates 150
 
-`make_world` steps all worlds at once and restarts those that end; `critic_state` is
-what no agent sees alone. In rally both are paid whenever the puck crosses the middle.
+`make_world` steps all worlds in one call and restarts those that end. `critic_state`
+returns the true state, which no agent observes. In rally both agents get a reward when
+the puck crosses the middle.
 """
 
 from __future__ import annotations
@@ -22,7 +23,12 @@ GAMMA, LAMBDA, CLIP, RATE = 0.99, 0.95, 0.2, 1e-3
 
 
 def network(scale: np.ndarray, outputs: int) -> nn.Module:
-    """Return a network of inputs, of which the largest values are given."""
+    """Return a network with two hidden layers.
+
+    Args:
+        scale: Largest values of the inputs, (D,).
+        outputs: Number of outputs.
+    """
     first, second = nn.Linear(len(scale), 64), nn.Linear(64, 64)
     first.weight.data /= torch.as_tensor(scale)
     return nn.Sequential(*(first, nn.Tanh(), second, nn.Tanh()), nn.Linear(64, outputs))
@@ -40,11 +46,11 @@ def advantages(reward: Tensor, value: Tensor, last: Tensor, alive: Tensor) -> Te
 
 def main(
     updates: Annotated[int, typer.Option(help="Number of rollouts.")] = 150,
-    game: Annotated[str, typer.Option(help="A game of one team.")] = "rally",
+    game: Annotated[str, typer.Option(help="Name of a game with one team.")] = "rally",
     seed: Annotated[int, typer.Option()] = 0,
 ) -> None:
     """Train, print the mean reward of a step, and measure the policy."""
-    torch.set_num_threads(1)  # Small networks are slower on several.
+    torch.set_num_threads(1)  # Small networks are slower with several threads.
     torch.manual_seed(seed)
     world = ah.make_world(game, WORLDS)
     seen = torch.as_tensor(world.reset(seed))

@@ -1,10 +1,10 @@
-"""Independent PPO with AgileRL: every paddle learns alone, games in processes.
+"""Train independent PPO with AgileRL: each paddle has a policy, each game a process.
 
     python -m venv .venv-agilerl
     .venv-agilerl/bin/pip install torch 'agilerl==2.58.0' peft -e .
     .venv-agilerl/bin/python scripts/tutorials/with_agilerl.py --steps 20000
 
-AgileRL wants a PettingZoo below 1.27, so it has an environment of its own.
+AgileRL needs a PettingZoo below 1.27, so it has a separate environment.
 """
 
 from __future__ import annotations
@@ -23,11 +23,15 @@ import marl_airhockey as ah
 
 
 def main(
-    game: Annotated[str, typer.Option(help="A scenario.")] = "rally",
-    steps: Annotated[int, typer.Option(help="Steps of worlds.")] = 20_000,
-    worlds: Annotated[int, typer.Option(help="Processes with a game each.")] = 2,
+    game: Annotated[str, typer.Option(help="Name of a scenario.")] = "rally",
+    steps: Annotated[
+        int, typer.Option(help="Number of steps, summed over all games.")
+    ] = 20_000,
+    worlds: Annotated[
+        int, typer.Option(help="Number of processes, with one game each.")
+    ] = 2,
 ) -> None:
-    """Train and print how the sum of rewards of an episode goes."""
+    """Train and print the sum of rewards of the evaluations."""
     torch.set_num_threads(1)
     env = AsyncPettingZooVecEnv([lambda: ah.parallel_env(game) for _ in range(worlds)])
     agents = env.possible_agents

@@ -1,9 +1,10 @@
-"""Read the authors' trajectories, or ours in their format, with h5py alone.
+"""Read the paper's trajectories, or ours in the same format, only with h5py.
 
     airhockey data export airhockey/juggle/expert-v0 --to hdf5 --name juggle --out sets
     python scripts/tutorials/with_h5py.py sets/juggle
 
-Poses are in the robot's base frame, whose x axis points from the table to the robot.
+Poses are in the base frame of the robot, whose x axis points from the table to the
+robot.
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ import numpy as np
 import typer
 
 POSE, TARGET, PUCK = slice(5, 11), slice(26, 32), slice(32, 35)
-"""Columns of `train_vals` in files of 35 columns"""
+"""Columns of `train_vals` in files with 35 columns."""
 FULL = np.array([0.26, 0.12])
-"""(2,) displacement of an action of 1, m"""
+"""Displacement of an action of 1, m, (2,)."""
 
 
 def main(
     folder: Annotated[Path, typer.Argument(help="Folder of trajectory_data*.hdf5.")],
 ) -> None:
-    """Print what the files hold."""
+    """Print a summary of the files."""
     paddles, actions, pucks = [], [], []
     files = sorted(folder.glob("trajectory_data*.hdf5"))
     for path in files:

@@ -1,9 +1,9 @@
-"""Read a LeRobot dataset of ours with pyarrow and pandas alone.
+"""Read a LeRobot dataset of this library only with pyarrow and pandas.
 
     airhockey data export airhockey/reach/expert-v0 --to lerobot --name reach --out sets
     python scripts/tutorials/with_lerobot_files.py sets/reach
 
-With lerobot installed (Python 3.12, an environment of its own) the same folder is
+With lerobot (Python 3.12, in a separate environment) the same folder is loaded by
 `LeRobotDataset("reach", root="sets/reach")`.
 """
 
@@ -21,7 +21,7 @@ import typer
 def main(
     folder: Annotated[Path, typer.Argument(help="Folder of the dataset.")],
 ) -> None:
-    """Print what a dataset holds."""
+    """Print a summary of a dataset."""
     info = json.loads((folder / "meta/info.json").read_text())
     frames = pd.read_parquet(folder / "data")
     episodes = pd.read_parquet(folder / "meta/episodes")

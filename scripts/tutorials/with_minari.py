@@ -1,10 +1,10 @@
-"""IQL with TorchRL on a Minari dataset of ours, without this library.
+"""Train IQL with TorchRL on a Minari dataset, without this library.
 
     airhockey data export airhockey/reach/expert-v0 --name airhockey/reach/expert-v0
     python scripts/tutorials/with_minari.py airhockey/reach/expert-v0 --steps 2000
 
-A dataset is loaded by `minari` alone. TorchRL's defaults are not those of the paper of
-implicit Q-learning; the ones given here are.
+The dataset is loaded by `minari` alone. The defaults of TorchRL differ from the paper
+of implicit Q-learning. The settings of this script are those of the paper.
 """
 
 from __future__ import annotations
@@ -50,7 +50,10 @@ def load_steps(name: str) -> TensorDict:
 
 
 def make_loss(observations: int, actions: int) -> tuple[IQLLoss, nn.Module]:
-    """Return the loss of IQL with networks of 256 x 256, and that of the actor."""
+    """Return the loss of IQL and the network of the actor.
+
+    The networks have two hidden layers of 256 units.
+    """
     network = nn.Sequential(
         MLP(observations, 2 * actions, num_cells=[256, 256]), NormalParamExtractor()
     )
@@ -88,7 +91,7 @@ def main(
     torch.manual_seed(seed)
     torch.set_num_threads(1)
     data = load_steps(name)
-    # Actions of exactly 1 have no density under a tanh.
+    # Actions of exactly 1 have no density if a tanh limits them.
     data["action"].clamp_(-1 + 1e-5, 1 - 1e-5)
     buffer = TensorDictReplayBuffer(
         storage=LazyTensorStorage(len(data)), batch_size=256

@@ -1,11 +1,11 @@
-"""Pufferlib's emulation: every agent of every game as a row of one array.
+"""Step games with pufferlib's emulation: each agent of each game is a row of an array.
 
     python -m venv .venv-pufferlib
     .venv-pufferlib/bin/pip install pufferlib-core -e .
     .venv-pufferlib/bin/python scripts/tutorials/with_pufferlib.py --game doubles
 
-`pufferlib-core` is the part of pufferlib that steps environments; it brings a torch of
-its own choice, so it has an environment of its own.
+`pufferlib-core` is the part of pufferlib that steps environments. It installs a torch
+version of its choice, so it has a separate environment.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ import marl_airhockey as ah
 
 
 def main(
-    game: Annotated[str, typer.Option(help="A scenario.")] = "doubles",
-    worlds: Annotated[int, typer.Option(help="Games at once.")] = 4,
-    steps: Annotated[int, typer.Option(help="Steps of all games.")] = 500,
+    game: Annotated[str, typer.Option(help="Name of a scenario.")] = "doubles",
+    worlds: Annotated[int, typer.Option(help="Number of games in a batch.")] = 4,
+    steps: Annotated[int, typer.Option(help="Number of steps of each game.")] = 500,
 ) -> None:
     """Step games with random actions and print the rate."""
     envs = pufferlib.vector.make(
@@ -39,7 +39,7 @@ def main(
         _, _, terminated, truncated, _ = envs.step(envs.action_space.sample())
         ended += int((terminated | truncated).sum())
     rate = steps * len(observations) / (time.perf_counter() - began)
-    print(f"{game}: {rate:,.0f} steps of agents per second, {ended} ends of agents")
+    print(f"{game}: {rate:,.0f} agent-steps per second, {ended} ends of agents")
     envs.close()
 
 

@@ -1,10 +1,11 @@
-"""Two policies with RLlib's new API stack, one at each end of a duel.
+"""Train two policies with RLlib's new API stack, one at each end of a duel.
 
     python scripts/tutorials/with_rllib.py --iterations 3
 
-Plain RLlib on the PettingZoo environment, to copy from: `ParallelPettingZooEnv`, a
-separate policy for each agent, a checkpoint, and a policy from it as a driver.
-`airhockey train duel --engine rllib` is the fast way: its runners step many worlds.
+This is an example of plain RLlib on the PettingZoo environment:
+`ParallelPettingZooEnv`, a separate policy for each agent, a checkpoint, and one of its
+policies as a driver. `airhockey train duel --engine rllib` is faster, because its
+runners step many worlds.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from marl_airhockey.registry import make_driver
 
 
 def make_duel(_: Any) -> ParallelPettingZooEnv:
-    """Return a duel of 20 s as RLlib needs it."""
+    """Return a duel of 20 s in the form that RLlib needs."""
     env = ah.parallel_env("duel", backend="numba", options={"seconds": 20.0})
     return ParallelPettingZooEnv(env)
 
@@ -54,10 +55,14 @@ def load_driver(checkpoint: Path, policy: str) -> Policy:
 
 
 def main(
-    iterations: Annotated[int, typer.Option(help="Of training.")] = 3,
-    steps: Annotated[int, typer.Option(help="Environment steps of each.")] = 4000,
-    num_env_runners: Annotated[int, typer.Option(help="Processes beside this.")] = 0,
-    games: Annotated[int, typer.Option(help="Games of the evaluation.")] = 50,
+    iterations: Annotated[int, typer.Option(help="Number of training iterations.")] = 3,
+    steps: Annotated[
+        int, typer.Option(help="Number of environment steps of each iteration.")
+    ] = 4000,
+    num_env_runners: Annotated[
+        int, typer.Option(help="Number of additional processes.")
+    ] = 0,
+    games: Annotated[int, typer.Option(help="Number of games of the evaluation.")] = 50,
 ) -> None:
     """Train both policies, load one, and let it play a random driver."""
     start_ray(num_env_runners)
@@ -90,7 +95,7 @@ def main(
         result = algorithm.train()["env_runners"]
         returns = result.get("agent_episode_returns_mean", {})
         shown = ", ".join(f"{k} {v:+.2f}" for k, v in sorted(returns.items()))
-        print(f"iteration {i + 1}: goals an episode: {shown}")
+        print(f"iteration {i + 1}: goals per episode: {shown}")
     checkpoint = Path(tempfile.mkdtemp(prefix="duel-"))
     algorithm.save_to_path(str(checkpoint))
     algorithm.stop()

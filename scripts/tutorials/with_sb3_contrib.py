@@ -1,10 +1,11 @@
-"""Algorithms of sb3-contrib: a recurrent PPO, and TQC with hindsight goals.
+"""Train algorithms of sb3-contrib: a recurrent PPO, and TQC with hindsight goals.
 
     python scripts/tutorials/with_sb3_contrib.py
 
-RecurrentPPO plays with delays and noise and sees one moment at a time, so it needs a
-memory. TQC learns to reach goals that it is shown apart (`goals="dict"`), and relabels
-what it missed. Both step our batches of worlds as they are.
+RecurrentPPO plays with latency and noise and observes one moment at a time, so it needs
+a memory. TQC learns to reach goals that are separate from the observation
+(`goals="dict"`), and relabels steps with goals that it reached. Both step our batches
+of worlds without a wrapper.
 """
 
 from __future__ import annotations
@@ -22,17 +23,19 @@ import marl_airhockey as ah
 
 
 def train(model: Any, name: str, steps: int, env: Any) -> None:
-    """Train a model and print what an episode pays then."""
+    """Train a model and print the mean return of an episode."""
     began = time.perf_counter()
     model.learn(steps)
     rate = model.num_timesteps / (time.perf_counter() - began)
     mean, spread = evaluate_policy(model, env, n_eval_episodes=20, warn=False)
     print(f"{name}: {model.num_timesteps:,} steps at {rate:,.0f} per second")
-    print(f"{name}: {mean:.2f} an episode, standard deviation {spread:.2f}")
+    print(f"{name}: mean return {mean:.2f}, standard deviation {spread:.2f}")
 
 
 def main(
-    steps: Annotated[int, typer.Option(help="Steps of worlds.")] = 30_000,
+    steps: Annotated[
+        int, typer.Option(help="Number of steps, summed over all worlds.")
+    ] = 30_000,
 ) -> None:
     """Train both, one after the other."""
     torch.set_num_threads(1)

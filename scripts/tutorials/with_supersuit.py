@@ -1,13 +1,14 @@
-"""Parameter sharing with SuperSuit and stable-baselines3, as PettingZoo's tutorials do.
+"""Share parameters with SuperSuit and stable-baselines3, as in PettingZoo's tutorials.
 
     python scripts/tutorials/with_supersuit.py --steps 200000
 
 One policy learns to play both ends of a duel against itself. The calls are those of
-PettingZoo's tutorial on SB3, with another game in the line that imports it: SuperSuit
-makes every agent a slot of a vector environment, and SB3 sees ordinary environments.
-Our own `make_sb3_vec` does the same for thousands of worlds at once, with seeds and the
-right values at time limits, which SuperSuit 3.11 lacks; `airhockey train duel` adds
-opponents. So this suits those who have a SuperSuit pipeline already.
+PettingZoo's tutorial on SB3, with another game in the import. SuperSuit makes every
+agent a slot of a vector environment, so SB3 gets ordinary environments.
+
+Our own `make_sb3_vec` does the same for thousands of worlds in one call, with seeds and
+correct values at time limits, which SuperSuit 3.11 does not have. `airhockey train
+duel` adds opponents. Use this script if you already have a pipeline with SuperSuit.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def make_vec_env(copies: int) -> Any:
 
 
 def watch(model: PPO, seed: int) -> dict[str, float]:
-    """Play a game in turns and return the sum of rewards of each agent."""
+    """Play a game and return the sum of rewards of each agent."""
     env = duel_v0.env(options={"seconds": 20.0})
     env.reset(seed=seed)
     rewards = dict.fromkeys(env.possible_agents, 0.0)
@@ -53,12 +54,16 @@ def watch(model: PPO, seed: int) -> dict[str, float]:
 
 
 def main(
-    steps: Annotated[int, typer.Option(help="Steps of single agents.")] = 200_000,
-    copies: Annotated[int, typer.Option(help="Duels at once.")] = 16,
-    games: Annotated[int, typer.Option(help="Games of the evaluation.")] = 100,
+    steps: Annotated[
+        int, typer.Option(help="Number of steps, summed over all agents.")
+    ] = 200_000,
+    copies: Annotated[int, typer.Option(help="Number of duels in a batch.")] = 16,
+    games: Annotated[
+        int, typer.Option(help="Number of games of the evaluation.")
+    ] = 100,
 ) -> None:
     """Train a policy and let it play itself and a random driver."""
-    torch.set_num_threads(1)  # small networks gain nothing from more
+    torch.set_num_threads(1)  # Small networks gain nothing from more.
     env = make_vec_env(copies)
     model = PPO(
         "MlpPolicy",
@@ -77,7 +82,7 @@ def main(
     print("a game against itself:", watch(model, 0))
     opponents, player = [make_driver("random")], make_driver(model)
     score, margin = play_against("duel", player, opponents, games, 0, {})
-    print(f"score against random: {score[0]:.3f} ({margin[0]:+.2f} goals a game)")
+    print(f"score against random: {score[0]:.3f} ({margin[0]:+.2f} goals per game)")
 
 
 if __name__ == "__main__":

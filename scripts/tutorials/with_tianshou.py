@@ -1,10 +1,10 @@
-"""SAC with tianshou: one paddle, one task.
+"""Train SAC with tianshou: one paddle, one task.
 
     python -m venv .venv-tianshou
     .venv-tianshou/bin/pip install torch 'tianshou[eval]==2.0.1' -e .
     .venv-tianshou/bin/python scripts/tutorials/with_tianshou.py --task reach --epochs 3
 
-Tianshou wants a pandas below 3, so it has an environment of its own.
+tianshou needs a pandas below 3, so it has a separate environment.
 """
 
 from __future__ import annotations
@@ -24,11 +24,15 @@ from marl_airhockey.discovery import gymnasium_id
 
 
 def main(
-    task: Annotated[str, typer.Option(help="A scenario with one seat.")] = "reach",
-    epochs: Annotated[int, typer.Option(help="Evaluations.")] = 3,
-    steps: Annotated[int, typer.Option(help="Steps between two of them.")] = 2000,
+    task: Annotated[
+        str, typer.Option(help="Name of a scenario with one seat.")
+    ] = "reach",
+    epochs: Annotated[
+        int, typer.Option(help="Number of epochs, each with an evaluation.")
+    ] = 3,
+    steps: Annotated[int, typer.Option(help="Number of steps of an epoch.")] = 2000,
 ) -> None:
-    """Train, evaluate, and let the policy drive a paddle of ours."""
+    """Train, evaluate, and use the policy as a driver of a paddle."""
     torch.set_num_threads(1)
     envs = EnvFactoryRegistered(task=gymnasium_id(task), venv_type=VectorEnvType.DUMMY)
     experiment = (
@@ -66,7 +70,7 @@ def main(
 
     world = ah.make_world(task, drivers={"paddle_0": act})
     world.reset(seed=0)
-    print("drives a paddle of ours:", world.driven[0].driver)
+    print("driver of paddle_0:", world.driven[0].driver)
 
 
 if __name__ == "__main__":

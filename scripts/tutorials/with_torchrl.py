@@ -1,9 +1,9 @@
-"""MAPPO with TorchRL: a critic that sees the true state, on the rally game.
+"""Train MAPPO with TorchRL on rally, with a critic that observes the true state.
 
     python scripts/tutorials/with_torchrl.py --updates 20
 
-`make_torchrl` steps many worlds as one environment; teammates are one group, and the
-key ``state`` gives the critic what no agent sees alone.
+`make_torchrl` steps many worlds as one environment. Teammates are one group. The key
+``state`` contains the true state for the critic, which no agent observes.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ GROUP = "team_0"
 
 
 class StateCritic(nn.Module):
-    """Critic that gives all agents one value of the global state."""
+    """Critic that returns the same value of the global state for all agents."""
 
     def __init__(self, size: int, agents: int) -> None:
         super().__init__()
@@ -41,19 +41,19 @@ class StateCritic(nn.Module):
         )
 
     def forward(self, state: torch.Tensor) -> torch.Tensor:
-        """Return (..., agents, 1) values of states (..., D)."""
+        """Return the values (..., agents, 1) of states (..., D)."""
         value: torch.Tensor = self.net(state)
         return value[..., None, :].expand(*value.shape[:-1], self.agents, 1)
 
 
 def make_rally(worlds: int) -> TransformedEnv:
-    """Return rallies with the return of their episodes."""
+    """Return worlds of rally that also report the returns of their episodes."""
     returns = RewardSum(in_keys=[(GROUP, "reward")], out_keys=[(GROUP, "returns")])
     return TransformedEnv(ah.make_torchrl("rally", worlds), returns)
 
 
 def share_ends(data: TensorDictBase) -> None:
-    """Tell each agent that the episode of all has ended, as the loss wants it."""
+    """Copy the ends of episodes to each agent, in the form that the loss needs."""
     after = data["next"]
     for end in ("done", "terminated"):
         shape = after[GROUP, "reward"].shape
@@ -61,7 +61,7 @@ def share_ends(data: TensorDictBase) -> None:
 
 
 def make_actor(env: TransformedEnv) -> ProbabilisticActor:
-    """Return a policy that all agents share, each acting on its own observation."""
+    """Return a policy that all agents share and that acts on single observations."""
     agents, size = env.observation_spec[GROUP, "observation"].shape[-2:]
     network = nn.Sequential(
         MultiAgentMLP(
@@ -82,7 +82,7 @@ def make_actor(env: TransformedEnv) -> ProbabilisticActor:
 
 
 def make_loss(env: TransformedEnv, actor: ProbabilisticActor) -> ClipPPOLoss:
-    """Return PPO's loss with a critic of the global state."""
+    """Return the loss of PPO with a critic of the global state."""
     agents = env.observation_spec[GROUP, "observation"].shape[-2]
     critic = TensorDictModule(
         StateCritic(env.observation_spec["state"].shape[-1], agents),
@@ -103,10 +103,17 @@ def make_loss(env: TransformedEnv, actor: ProbabilisticActor) -> ClipPPOLoss:
 
 
 def main(
-    updates: Annotated[int, typer.Option(help="Policy updates.")] = 20,
-    frames: Annotated[int, typer.Option(help="Steps between two updates.")] = 6400,
-    worlds: Annotated[int, typer.Option(help="Stepped as one environment.")] = 64,
-    seed: Annotated[int, typer.Option(help="Of network and environment.")] = 0,
+    updates: Annotated[int, typer.Option(help="Number of policy updates.")] = 20,
+    frames: Annotated[
+        int,
+        typer.Option(
+            help="Number of steps between two updates, summed over all worlds."
+        ),
+    ] = 6400,
+    worlds: Annotated[
+        int, typer.Option(help="Number of worlds in the environment.")
+    ] = 64,
+    seed: Annotated[int, typer.Option(help="Seed of network and environment.")] = 0,
 ) -> None:
     """Check the environment, then train."""
     torch.manual_seed(seed)
@@ -140,7 +147,7 @@ def main(
         done = data["next", GROUP, "done"]
         returns = data["next", GROUP, "returns"][done]
         mean = f"{returns.mean():.2f}" if len(returns) else "no episode ended"
-        print(f"update {update + 1}: crossings an episode {mean}")
+        print(f"update {update + 1}: crossings per episode {mean}")
     collector.shutdown()
 
 

@@ -55,7 +55,7 @@ def test_a_policy_is_measured_where_it_was_trained_unless_told_otherwise():
     words = ("evaluate", "zoo/touch", "--episodes", 5, "--no-floors", "--json")
     assert json.loads(airhockey(*words).stdout)["scenario"] == "touch"
     told = airhockey("evaluate", "striker", "--episodes", 5, ok=False).stderr
-    assert "scenario: say what the driver is to play" in told
+    assert "scenario: none is known" in told
 
 
 def test_watch_writes_a_film(tmp_path):
@@ -84,20 +84,20 @@ def test_demo_makes_what_it_says(tmp_path):
         (("evaluate", "zoo/nobody"), "unknown policy of the zoo 'zoo/nobody'; there"),
         (("evaluate", "still", "-s", "juggle", "--option", "lft=3"), "mean 'lift'?"),
         (("evaluate", "still", "-s", "juggle", "--physics", "tlt=3"), "mean 'tilt'?"),
-        (("fit-table", "none.csv"), "none.csv: there is no such file"),
+        (("fit-table", "none.csv"), "none.csv: this file does not exist"),
         (("evaluate", "x.zip", "-s", "juggle"), "no such policy file"),
         (("train", "jugle"), "unknown scenario"),
         (("train", "juggle", "--set", "gama=1"), "unknown setting 'gama'"),
         (("train", "juggle", "--set", "gamma"), "NAME=VALUE"),
-        (("train", "--resume", "nowhere"), "no training configuration"),
-        (("train", "--resume", "nowhere", "--engine", "sb3"), "give nothing else"),
+        (("train", "--resume", "nowhere"), "not a training configuration"),
+        (("train", "--resume", "nowhere", "--engine", "sb3"), "remove all other"),
         (("train", "reach", "--engine", "jax"), "unknown engine 'jax'"),
         (("train", "reach", "--engine", "rllib", "--num-env-runners", "3"), "divide"),
-        (("data", "report", "nowhere"), "no such folder"),
+        (("data", "report", "nowhere"), "this folder does not exist"),
         (("data", "check", "nowhere"), "no such file or folder"),
         (("league", "duel", "--games", "0"), "--games"),
-        (("league", "rally"), "try airhockey crossplay rally"),
-        (("export", "nowhere"), "nowhere: there is no training run"),
+        (("league", "rally"), "use airhockey crossplay rally"),
+        (("export", "nowhere"), "nowhere: this is not the folder of a training run"),
         (
             ("fit", "--recordings", "nowhere"),
             "no such file or folder",
@@ -108,7 +108,7 @@ def test_demo_makes_what_it_says(tmp_path):
         ),
         (
             ("fit", "juggle", "--backend", "numba", "--steps", "20"),
-            "play longer (--steps), or give more recordings",
+            "record more steps (--steps), or pass more recordings",
         ),
         (("watch", "still", "-s", "reach", "--video", "a.avi"), "must end in"),
         (
@@ -123,7 +123,7 @@ def test_demo_makes_what_it_says(tmp_path):
             ("evaluate", "still", "-s", "touch", *("--physics", "wooden") * 2),
             "preset is given twice",
         ),
-        (("train", "touch", "--driver", "paddle_0=striker"), "leave one out"),
+        (("train", "touch", "--driver", "paddle_0=striker"), "leave one seat open"),
         (("train", "touch", "--num-env-runners", "4"), "only the engine rllib"),
         (("train", "touch", "--seed", "-1"), "seed: -1 must be 0 or more"),
         (
@@ -143,7 +143,7 @@ def test_demo_makes_what_it_says(tmp_path):
                 "--rig",
                 __file__,
             ),
-            "no rig: a rig is a JSON file; airhockey calibrate",
+            "not a rig, expected a JSON file; airhockey calibrate",
         ),
     ],
 )
@@ -182,9 +182,9 @@ def test_precompile_reports_what_it_compiles_and_names_bad_input(tmp_path):
     for words, reason in (
         (("jugle",), "unknown scenario 'jugle'"),
         (("--target", "pentium", "--out", tmp_path), "unknown target 'pentium'"),
-        (("--target", "generic", "--out", tmp_path), "is there already; name a new"),
-        (("--target", "generic"), "--target and --out: give both"),
-        (("--out", tmp_path), "--target and --out: give both"),
+        (("--target", "generic", "--out", tmp_path), "this folder exists; give a new"),
+        (("--target", "generic"), "--target and --out need each other"),
+        (("--out", tmp_path), "--target and --out need each other"),
     ):
         assert reason in airhockey("precompile", *words, ok=False).stderr
 
@@ -194,23 +194,23 @@ def test_a_new_scenario_and_a_new_driver_run(tmp_path):
         done = process("new", kind, name, "--out", tmp_path)
         assert f"{name}.py" in "".join(done.stdout.split())
         again = process("new", kind, name, "--out", tmp_path, ok=False)
-        assert "there is such a file" in again.stderr
+        assert "this file exists" in again.stderr
     words = ("-s", "my_bank.py", "--episodes", 20, "--backend", "numba", "--json")
     done = process("evaluate", "my_push.py:behind=0.1", *words, cwd=tmp_path)
     data = json.loads(done.stdout)
     assert data["return"] > data["beside"]["still"]["return"]
-    assert "3 once." in process("list", "my_bank.py", cwd=tmp_path).stdout
+    assert "3, once." in process("list", "my_bank.py", cwd=tmp_path).stdout
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("scenario", "juggle"), "there is a scenario of this name"),
-        (("driver", "striker"), "there is a driver of this name"),
-        (("driver", "numpy"), "such a word or module"),
-        (("scenario", "class"), "such a word or module"),
-        (("driver", "My-Push"), "expected a name like my_task"),
-        (("driver", "my_push", "--out", "nowhere"), "no such folder"),
+        (("scenario", "juggle"), "a scenario has this name"),
+        (("driver", "striker"), "a driver has this name"),
+        (("driver", "numpy"), "a keyword or a module of Python"),
+        (("scenario", "class"), "a keyword or a module of Python"),
+        (("driver", "My-Push"), "expected lower-case letters"),
+        (("driver", "my_push", "--out", "nowhere"), "this folder does not exist"),
     ],
 )
 def test_a_name_that_cannot_be_new_is_refused(words, message, tmp_path):
@@ -238,7 +238,7 @@ def test_meanings_are_those_of_the_nearest_class():
 
     meanings = term_meanings(Own)
     assert meanings["touch"] == "5 for each touch, even a late one."
-    assert meanings["drop"] == "-1 when the puck passes the home line."
+    assert meanings["drop"] == "-1 when the puck crosses the home line."
     assert meanings["jitter"].startswith("``-jitter_weight``")
 
 
@@ -251,7 +251,7 @@ def test_physics_takes_presets_values_and_ranges():
 
 def test_resuming_a_finished_run_says_how_to_train_on(touch_run):
     said = airhockey("train", "--resume", touch_run).stdout
-    assert "this run was finished already" in said
+    assert "this run is complete" in said
     assert f"--init {touch_run}" in said
 
 

@@ -102,13 +102,13 @@ def test_names_of_built_datasets_are_paths_of_recordings(tmp_path, monkeypatch):
     build_dataset(find_dataset(NAME), tmp_path / "datasets" / NAME, 500)
     assert len(recordings_in([type(tmp_path)(NAME)])) == 4
     assert built(NAME) == tmp_path / "datasets" / NAME
-    with pytest.raises(ValueError, match="several recordings; name one: airhockey/"):
+    with pytest.raises(ValueError, match="several recordings; give one: airhockey/"):
         one_recording(type(tmp_path)(NAME))
     part = type(tmp_path)(f"{NAME}/random")
     assert one_recording(part) == tmp_path / "datasets" / part
     with pytest.raises(
         ValueError,
-        match="unknown dataset 'airhockey/touch/best-v0'; near it are airhockey/touch/",
+        match="'airhockey/touch/best-v0'; similar names are airhockey/touch/",
     ):
         built("airhockey/touch/best-v0")
 

@@ -131,7 +131,7 @@ def test_an_episode_whose_film_ends_before_it_is_named_and_left_out(tmp_path):
     grey_film(path, 8)
     result = CliRunner().invoke(app, ["data", "check", str(path)])
     assert result.exit_code == 1
-    assert "episode 1: the film ends 2 pictures before it" in result.output
+    assert "episode 1: the video ends 2 frames before the episode" in result.output
     assert "1 good episodes, 1 faults" in result.output
     with pytest.warns(RuntimeWarning, match="episode 1: .* left out"):
         folder = export_lerobot([path], "reach", tmp_path / "sets")
@@ -140,7 +140,7 @@ def test_an_episode_whose_film_ends_before_it_is_named_and_left_out(tmp_path):
     grey_film(path, 3)
     with (
         pytest.warns(RuntimeWarning, match="left out"),
-        pytest.raises(ValueError, match="the film ends before every episode"),
+        pytest.raises(ValueError, match="the video ends before every episode"),
     ):
         export_lerobot([path], "none", tmp_path / "sets")
 
@@ -368,26 +368,26 @@ def test_seats_that_are_not_there_are_refused(tmp_path, form):
 def test_folder_that_cannot_be_made_is_named(tmp_path):
     path = recorded(tmp_path, "touch", "still", 1)
     (tmp_path / "file").write_text("")
-    with pytest.raises(ValueError, match="cannot be made"):
+    with pytest.raises(ValueError, match="cannot be created"):
         find_format("rows").export([path], "x", tmp_path / "file", 0)
-    with pytest.raises(ValueError, match="cannot be made"):
+    with pytest.raises(ValueError, match="cannot be created"):
         relabelled(path, "touch", tmp_path / "file" / "x")
 
 
 def test_source_of_no_known_format_is_named(tmp_path):
     (tmp_path / "other").mkdir()
-    with pytest.raises(ValueError, match="no LeRobot dataset"):
+    with pytest.raises(ValueError, match="not a LeRobot dataset"):
         import_dataset(settings_for(tmp_path / "other", "touch", tmp_path / "new"))
 
 
 BAD_ROWS = {
     "column 'y' is missing": "t,x\n0,1\n",
-    "'abc' is no number": "t,x,y\n0,1,abc\n",
-    "times do not grow|times grow": "t,x,y\n0,0,0\n",
+    "'abc'; expected a number": "t,x,y\n0,1,abc\n",
+    "times must increase|increasing times": "t,x,y\n0,0,0\n",
     r"0\.5 s follows 1\.0 s": "t,x,y\n0,0,0\n1,0,0\n0.5,0,0\n",
-    "line 3: 1 cells, expected 3": "t,x,y\n0,0,0\n1\n",
+    "line 3: 1 cells; expected 3": "t,x,y\n0,0,0\n1\n",
     "row 1: the puck at .* is off the table": "t,x,y\n0,0,0\n1,300,0\n",
-    "never seen": "t,x,y\n0,,\n1,,\n",
+    "never detected": "t,x,y\n0,,\n1,,\n",
     "a time is missing": "t,x,y\n,0,0\n1,0,0\n",
 }
 
@@ -406,10 +406,10 @@ def test_bad_trajectories_are_named_and_leave_nothing(tmp_path):
     source = tmp_path / "trajectory_data0.hdf5"
     out = tmp_path / "new"
     for values, words in (
-        (np.zeros((5, 20)), "expected two rows or more of 35 or 32 or 31 columns"),
-        (np.zeros((1, 35)), "expected two rows"),
+        (np.zeros((5, 20)), "expected at least two rows of 35 or 32 or 31 columns"),
+        (np.zeros((1, 35)), "expected at least two rows"),
         (np.full((5, 35), np.nan), "row 0 is not finite"),
-        (np.zeros((5, 35)), "times do not grow"),
+        (np.zeros((5, 35)), "times must increase"),
     ):
         with h5py.File(source, "w") as file:
             file["train_vals"] = values
@@ -431,7 +431,7 @@ def test_bad_trajectories_are_named_and_leave_nothing(tmp_path):
 def test_bad_lerobot_datasets_are_named_and_leave_nothing(tmp_path):
     path, out = recorded(tmp_path), tmp_path / "new"
     folder = export_lerobot([path], "reach", tmp_path / "sets")
-    with pytest.raises(ValueError, match="there is such a folder"):
+    with pytest.raises(ValueError, match="the folder exists"):
         export_lerobot([path], "reach", tmp_path / "sets")
     with pytest.raises(ValueError, match="--seat 4"):
         export_lerobot([path], "other", tmp_path / "sets", 4)
@@ -441,7 +441,7 @@ def test_bad_lerobot_datasets_are_named_and_leave_nothing(tmp_path):
     info = folder / "meta/info.json"
     content = json.loads(info.read_text())
     info.write_text(json.dumps({**content, "codebase_version": "v2.1"}))
-    with pytest.raises(ValueError, match=r"version 'v2.1', expected 'v3.0'"):
+    with pytest.raises(ValueError, match=r"version 'v2.1'; expected 'v3.0'"):
         import_dataset(settings_for(folder, "reach", out))
     del content["features"]["next.reward"]
     info.write_text(json.dumps(content))

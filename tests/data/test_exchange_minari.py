@@ -107,15 +107,15 @@ def test_goals_stay_apart(tmp_path):
 
 def test_what_cannot_be_is_named_and_leaves_nothing(tmp_path, root):
     path = recorded(tmp_path)
-    with pytest.raises(ValueError, match="expected it as in"):
+    with pytest.raises(ValueError, match="expected a name such as"):
         export_minari([path], "no version")
     with pytest.raises(ValueError, match="--seat 4"):
         export_minari([path], NAME, seat=4)
     assert not (root / NAME).exists()
     export_minari([path], NAME)
-    with pytest.raises(ValueError, match="take a new version"):
+    with pytest.raises(ValueError, match="give a new version"):
         export_minari([path], NAME)
-    with pytest.raises(ValueError, match="no such Minari dataset"):
+    with pytest.raises(ValueError, match="this Minari dataset does not exist"):
         import_minari(
             ImportSettings("airhockey/none/none-v0", "reach", tmp_path / "other")
         )

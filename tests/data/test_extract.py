@@ -31,7 +31,7 @@ def test_a_video_without_puck_and_paddle_is_refused(tmp_path):
     for _ in range(5):
         writer.append(np.full((height, width, 3), 120, np.uint8))
     writer.close()
-    with pytest.raises(ValueError, match=r"grey.mp4: no picture shows a puck"):
+    with pytest.raises(ValueError, match=r"grey.mp4: no frame shows a puck"):
         extract(tmp_path / "grey.mp4", RIG)
-    with pytest.raises(ValueError, match="calibrate anew"):
+    with pytest.raises(ValueError, match="calibrate again"):
         extract(tmp_path / "grey.mp4", replace(RIG, paddle=None))

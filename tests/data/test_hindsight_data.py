@@ -55,9 +55,9 @@ def test_play_of_another_task_becomes_data_of_a_goal_task(tmp_path):
 
 def test_hindsight_without_goals_is_refused(tmp_path):
     path = recorded(tmp_path, "juggle", "still", 2)
-    with pytest.raises(ValueError, match="juggle: it has no goals"):
+    with pytest.raises(ValueError, match="juggle: this scenario has no goals"):
         with_hindsight(path, "juggle", tmp_path / "new")
     path = recorded(tmp_path, "hit_goal", "still", 2, options={"seconds": 0.1})
-    with pytest.raises(ValueError, match="no goal of hit_goal was reached"):
+    with pytest.raises(ValueError, match="no episode reached a goal of hit_goal"):
         with_hindsight(path, "hit_goal", tmp_path / "new")
     assert not (tmp_path / "new").exists()

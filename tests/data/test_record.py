@@ -150,7 +150,7 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "notes.txt").write_text("mine")
     driver = ah.make_driver("still")
-    with pytest.raises(ValueError, match="holds something else"):
+    with pytest.raises(ValueError, match="contains other files"):
         record_episodes(driver, "still", "touch", 1, tmp_path / "other", 7, {})
 
 
@@ -165,13 +165,13 @@ def test_recordings_are_divided_and_merged(tmp_path):
         recordings_in([path, tmp_path / "parts", path])
     again = read_recording(tmp_path / "whole").episodes
     assert [e.seed for e in again] == seeds[0] + seeds[1]
-    with pytest.raises(ValueError, match="at least one for train"):
+    with pytest.raises(ValueError, match="at least one episode for train"):
         divided(path, tmp_path / "none", 0.0, seed=0)
     merged([path, record(tmp_path / "b", "random", "touch", 1)], tmp_path / "two")
     assert read_recording(tmp_path / "two").head["players"] == [
         {"driver": "still + random", "person": None}
     ]
-    with pytest.raises(ValueError, match="it has 10 episodes already"):
+    with pytest.raises(ValueError, match="it already has 10 episodes"):
         record(tmp_path, "still", "touch", 3)
     other = record(tmp_path / "more", "still", "reach", 1)
     with pytest.raises(ValueError, match="scenario is 'reach'"):

@@ -136,7 +136,7 @@ def test_after_an_error_there_is_no_recording(tmp_path):
     with whole(tmp_path / "a") as file:
         file.begin(first())
     with (
-        pytest.raises(ValueError, match="there is such a folder"),
+        pytest.raises(ValueError, match="the folder exists"),
         whole(tmp_path / "a"),
     ):
         pass
@@ -163,7 +163,7 @@ def test_columns_that_change_are_refused(tmp_path):
     with RecordingWriter(tmp_path / "a", HEAD) as file:
         file.begin(first())
         file.add_rows(columns(2))
-        with pytest.raises(ValueError, match="change: extra"):
+        with pytest.raises(ValueError, match="columns extra: expected the same"):
             file.add_rows({**columns(2), "extra": np.zeros(2)})
         with pytest.raises(ValueError, match="count: shape"):
             file.add_rows({**columns(2), "count": np.zeros((2, 3))})
@@ -293,16 +293,16 @@ def text(name, words):
 SECOND = "steps/part-00001.parquet"
 BROKEN = {
     "no meta": (remove("meta.json"), "cannot be read"),
-    "empty meta": (text("meta.json", ""), "no recording"),
-    "text": (text("meta.json", "hello"), "no recording"),
-    "binary": (lambda p: (p / "meta.json").write_bytes(b"\xff\0"), "no recording"),
-    "a list": (text("meta.json", "[1, 2]"), "no recording"),
-    "another's": (text("meta.json", '{"kind": "diary"}'), "no recording"),
+    "empty meta": (text("meta.json", ""), "not a recording"),
+    "text": (text("meta.json", "hello"), "not a recording"),
+    "binary": (lambda p: (p / "meta.json").write_bytes(b"\xff\0"), "not a recording"),
+    "a list": (text("meta.json", "[1, 2]"), "not a recording"),
+    "another's": (text("meta.json", '{"kind": "diary"}'), "not a recording"),
     "old": (change_meta(format=3), "another version"),
     "new": (change_meta(format=99), "another version"),
     "no scenario": (change_meta(scenario=None), "scenario"),
-    "dt 0": (change_meta(control_dt=0), "dt 0 is"),
-    "dt text": (change_meta(control_dt="x"), "dt 'x' is"),
+    "dt 0": (change_meta(control_dt=0), "dt 0; expected"),
+    "dt text": (change_meta(control_dt="x"), "dt 'x'; expected"),
     "no columns": (change_meta(columns=None), "columns"),
     "odd columns": (change_meta(columns={"x": 3}), "column x: 3"),
     "objects": (
@@ -342,7 +342,7 @@ BROKEN = {
             pq.ParquetFile(path / "episodes.parquet").read().slice(0, 1),
             path / "episodes.parquet",
         ),
-        "episode 1: it is not in episodes.parquet",
+        "episode 1: it is missing in episodes.parquet",
     ),
     "episodes out of order": (
         lambda path: pq.write_table(
@@ -353,7 +353,7 @@ BROKEN = {
     ),
     "steps that jump": (
         replaced("step", lambda t: pa.array(np.arange(len(t), dtype=np.int32) * 2)),
-        "jump",
+        "not consecutive",
     ),
 }
 
@@ -458,7 +458,7 @@ def test_steps_that_lack_at_the_end_are_named(tmp_path):
     (words,) = missing_steps(path).values()
     assert words == f"{path}: episode 2: 40 of its 60 steps are missing at the end"
     assert read_recording(path).episodes[2].reason == ""
-    with pytest.raises(ValueError, match=r"1 of its episodes lack .* data repair"):
+    with pytest.raises(ValueError, match=r"missing in 1 episodes; .* data repair"):
         whole_recordings_in([path])
     assert repaired(path, tmp_path / "good") == [words]
     assert len(read_recording(tmp_path / "good").episodes) == 2

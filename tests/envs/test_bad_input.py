@@ -52,7 +52,7 @@ def full_of(value):
         ),
         (
             lambda: ah.parallel_env("duel", drivers=["striker"]),
-            "is no dict of drivers by agent",
+            "is not a dict of drivers by agent",
         ),
         (
             lambda: ah.parallel_env("juggle", physics={"preset": ["wooden"]}),
@@ -61,27 +61,30 @@ def full_of(value):
         (lambda: ah.evaluate("still", "juggle", episodes=0), "episodes: 0 must be"),
         (
             lambda: ah.parallel_env("juggle", drivers={"paddle_0": "still"}),
-            "every seat of 'juggle' has one",
+            "every seat of 'juggle' has a driver",
         ),
         (
             lambda: ah.make_sb3_vec("juggle", drivers={"paddle_0": "still"}),
-            "every seat of 'juggle' has one",
+            "every seat of 'juggle' has a driver",
         ),
         (
             lambda: ah.gym_env("juggle", drivers={"paddle_0": "still"}),
-            "every seat of 'juggle' has one",
+            "every seat of 'juggle' has a driver",
         ),
         (
             lambda: ah.parallel_env("duel", options={"reaction": 0.12}),
-            'no multiple of control_dt, 0.05 s; .*"reaction": 0.1} or 0.15',
+            'not a multiple of control_dt, 0.05 s; .*"reaction": 0.1} or 0.15',
         ),
         (
             lambda: ah.parallel_env("juggle", control_dt=0.5),
             "control_dt: 0.5 s must be in 0.001 .. 0.2; in longer",
         ),
         (lambda: ah.league("rally", ["still", "random"]), "airhockey crossplay rally"),
-        (lambda: ah.parallel_env("juggle").reset(seed="abc"), "seed: 'abc' is no"),
-        (lambda: ah.gym_env("juggle").reset(seed="abc"), "seed: 'abc' is no whole"),
+        (lambda: ah.parallel_env("juggle").reset(seed="abc"), "seed: 'abc'; expected"),
+        (
+            lambda: ah.gym_env("juggle").reset(seed="abc"),
+            "seed: 'abc'; expected a whole number",
+        ),
         (lambda: ah.league("duel", ["still", "random"], games=3), "an even number"),
         (
             lambda: ah.parallel_env("juggle", observ="velocity"),
@@ -112,11 +115,11 @@ def full_of(value):
         (lambda: ah.make_vec("juggle", "64"), "num_worlds: '64' must be a whole"),
         (lambda: ah.make_sb3_vec("juggle", 2.5), "num_worlds: 2.5 must be a whole"),
         (lambda: ah.make_world("juggle", True), "num_worlds: True must be a whole"),
-        (lambda: ah.make_vec("juggle", num_envs=4), "here it is 'num_worlds'"),
-        (lambda: ah.make_sb3_vec("juggle", n_envs=4), "here it is 'num_worlds'"),
-        (lambda: ah.make_world("juggle", num_envs=4), "here it is 'num_worlds'"),
-        (lambda: ah.gym_env("juggle", max_steps=4), "here it is 'max_cycles'"),
-        (lambda: ah.gym_env("juggle", camera="top"), "here it is 'viewpoint'"),
+        (lambda: ah.make_vec("juggle", num_envs=4), "; use 'num_worlds'"),
+        (lambda: ah.make_sb3_vec("juggle", n_envs=4), "; use 'num_worlds'"),
+        (lambda: ah.make_world("juggle", num_envs=4), "; use 'num_worlds'"),
+        (lambda: ah.gym_env("juggle", max_steps=4), "; use 'max_cycles'"),
+        (lambda: ah.gym_env("juggle", camera="top"), "; use 'viewpoint'"),
         (lambda: Table.rectangle(-1.0, 0.6), "vertices"),
         (lambda: Table(CORNERS, puck_radius=0.4), "puck_radius"),
         (
@@ -134,12 +137,30 @@ def full_of(value):
             "block_radius",
         ),
         (lambda: ah.load_policy("nowhere.zip"), "no such policy"),
-        (lambda: ah.parallel_env("juggle", profile=None), "profile: None is no name"),
-        (lambda: ah.make_vec("juggle", 2, control_dt="0.05"), "'0.05' is no time in s"),
-        (lambda: ah.gym_env("juggle", control_dt=True), "control_dt: True is no time"),
-        (lambda: ah.make_world("juggle", options=["lift"]), "options: .* is no dict"),
-        (lambda: ah.make_sb3_vec("juggle", substeps="2"), "substeps: '2' is no whole"),
-        (lambda: ah.make_vec("juggle", 2, backend=3), "backend: 3 is no name of a"),
+        (
+            lambda: ah.parallel_env("juggle", profile=None),
+            "profile: None is not the name",
+        ),
+        (
+            lambda: ah.make_vec("juggle", 2, control_dt="0.05"),
+            "'0.05' is not a time in s",
+        ),
+        (
+            lambda: ah.gym_env("juggle", control_dt=True),
+            "control_dt: True is not a time",
+        ),
+        (
+            lambda: ah.make_world("juggle", options=["lift"]),
+            "options: .* is not a dict",
+        ),
+        (
+            lambda: ah.make_sb3_vec("juggle", substeps="2"),
+            "substeps: '2' is not a whole",
+        ),
+        (
+            lambda: ah.make_vec("juggle", 2, backend=3),
+            "backend: 3 is not the name of a",
+        ),
         (lambda: ah.make_vec("juggle", 2, physics={"tilt": "3"}), "'tilt'.*got '3'"),
         (lambda: ah.make_vec("juggle", 2, physics={"tilt": True}), "'tilt'.*got True"),
         (
@@ -153,23 +174,23 @@ def full_of(value):
         (lambda: ah.parallel_env("juggle", options={"pucks": 50}), "from 1 to 8"),
         (
             lambda: ah.parallel_env("hit_goal").reset(options={"radius": 0.5}),
-            "'radius' is a field of hit_goal; set it where",
+            "'radius' is a field of hit_goal; set it when",
         ),
         (
             lambda: ah.make_vec("juggle", 2).reset(options=[1]),
-            "options: .1. is no dict",
+            "options: .1.; expected a dict",
         ),
         (
             lambda: ah.make_vec("juggle", 2).reset(options={"reset_masks": [True] * 2}),
             "unknown reset option 'reset_masks'",
         ),
-        (lambda: ah.evaluate("striker"), "scenario: say what the driver is to play"),
+        (lambda: ah.evaluate("striker"), "scenario: none is known"),
         (lambda: ah.evaluate("still", "touch", seed=[1, 2]), "seed: .1, 2. must be"),
         (lambda: ah.evaluate("still", "touch", episodes=3.7), "episodes: 3.7 must be"),
-        (lambda: ah.evaluate(full_of(np.inf), "touch"), "no player .* such as .inf"),
-        (lambda: ah.evaluate(full_of(1j), "touch"), "no player .* of complex128"),
-        (lambda: ah.evaluate(full_of(True), "touch"), "no player .* of bool"),
-        (lambda: ah.evaluate(full_of("a"), "touch"), "no player .* of <U1"),
+        (lambda: ah.evaluate(full_of(np.inf), "touch"), "cannot act .* such as .inf"),
+        (lambda: ah.evaluate(full_of(1j), "touch"), "cannot act .* of complex128"),
+        (lambda: ah.evaluate(full_of(True), "touch"), "cannot act .* of bool"),
+        (lambda: ah.evaluate(full_of("a"), "touch"), "cannot act .* of <U1"),
     ],
 )
 def test_it_is_refused_when_built(build, words):
@@ -180,7 +201,7 @@ def test_it_is_refused_when_built(build, words):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "nothing in the file"),
+        ("", "the file is empty"),
         ("ranges = 3", "ranges: 3; expected a dict"),
         ("[ranges]\ntilt = [true, 3]", r"tilt: expected a number or \(low, high\)"),
         ("[ranges]\ntilt = [6, 3]", "tilt: .* must lie within"),
@@ -197,7 +218,7 @@ def test_a_wrong_profile_file_is_named(text, words, tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("", "no parameters in the file"), ('tilt = "3"', "got '3'"), ("x =", "no TOML")],
+    [("", "contains no parameters"), ('tilt = "3"', "got '3'"), ("x =", "no TOML")],
 )
 def test_a_wrong_physics_file_is_named(text, words, tmp_path):
     (tmp_path / "g.toml").write_text(text)
@@ -379,7 +400,7 @@ def test_a_state_of_another_scene_is_refused():
     env, other = ah.parallel_env("juggle"), ah.parallel_env("duel")
     for made in (env, other):
         made.reset(seed=0)
-    message = "of another scene, with 2 paddles, 1 pucks.*here there are 1 paddles"
+    message = "of another scene, with 2 paddles, 1 pucks.*expected 1 paddles"
     with pytest.raises(ValueError, match=message):
         env.set_state(*other.get_state())
 
@@ -392,7 +413,9 @@ def test_seeds_are_one_number_or_one_for_each_world():
     world.reset(7)
     assert world.seeds.tolist() == [7, 8, 9]
     for seed in ("a", 1.5, True, [1, 2], np.zeros((3, 1), int), -1, 2**64, [0, 1, -1]):
-        with pytest.raises(ValueError, match=r"is no whole number from 0 to 2\^64 - 1"):
+        with pytest.raises(
+            ValueError, match=r"expected a whole number from 0 to 2\^64"
+        ):
             world.reset(seed)
 
 

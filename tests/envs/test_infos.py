@@ -128,7 +128,7 @@ def test_an_unknown_keyword_is_an_error_in_the_words_of_python():
         ah.parallel_env("juggle", max_cycle=4)
     with pytest.raises(ValueError, match="autoreset_mode: 'never'"):
         ah.make_vec("juggle", autoreset_mode="never")
-    with pytest.raises(ValueError, match="nor one for each of 3"):
+    with pytest.raises(ValueError, match="or one for each of 3"):
         ah.make_vec("juggle", 3).reset(seed=[1, 2])
 
 

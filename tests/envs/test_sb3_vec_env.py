@@ -129,7 +129,7 @@ def test_slots_of_one_world_begin_with_the_same_options():
     state, _ = duel.get_state()
     options = [{"state": state.map(lambda x: x[0])}, {}, {}, {}]
     duel.set_options(options)
-    with pytest.raises(ValueError, match="slots of one world need the same"):
+    with pytest.raises(ValueError, match="slots of one world need equal"):
         duel.reset()
     duel.set_options([options[0], options[0], {}, {}])
     duel.reset()
@@ -170,7 +170,7 @@ def test_what_is_set_has_its_effect_or_is_refused():
             env.set_attr("max_cycles", 0)
         with pytest.raises(AttributeError, match="did you mean 'max_cycles'"):
             env.set_attr("max_cycle", 7)
-        with pytest.raises(AttributeError, match="build one with control_dt="):
+        with pytest.raises(AttributeError, match="create one with control_dt="):
             env.set_attr("control_dt", 0.1)
         with pytest.raises(AttributeError, match="lift"):
             env.set_attr("lift", 0.1)
@@ -229,7 +229,7 @@ def test_pictures_are_those_of_single_environments():
     for env in ours, theirs:
         with pytest.warns(UserWarning, match="no `render_mode` was passed"):
             assert env.render() is None
-        with pytest.warns(UserWarning, match="render mode is None"):
+        with pytest.warns(UserWarning, match="render.mode is None"):
             assert env.get_images() == [None] * SLOTS
         assert env.metadata["render_fps"] == 20
 

@@ -158,7 +158,7 @@ def test_a_built_environment_refuses_what_only_building_sets(build):
     assert env.note == "mine"
     with pytest.raises(AttributeError, match="did you mean 'max_cycles'"):
         env.max_cycle = 7
-    with pytest.raises(AttributeError, match="build one with profile="):
+    with pytest.raises(AttributeError, match="create one with profile="):
         env.profile = "ur5e"
     with pytest.raises(AttributeError, match="lift"):
         env.lift = 0.1

@@ -45,9 +45,9 @@ def test_what_is_not_played_counts_as_nothing():
     reach, touch = card.results[:2]
     assert reach.score == 1.0
     assert (touch.score, touch.player) == (0.0, "")
-    assert "no goal to reach" in touch.note
+    assert "has no goal" in touch.note
     assert card.totals["ideal"][0] == 0.5
-    with pytest.raises(ValueError, match="plays none of it"):
+    with pytest.raises(ValueError, match="plays no part of the challenge"):
         play_challenge("nobody", "nobody", "0", 2, 2)
 
 
@@ -68,5 +68,5 @@ def test_cards_of_other_protocols_are_refused():
     card = replace(play_challenge("reacher", "reacher", "0", 2, 2), protocol=0)
     with pytest.raises(ValueError, match="protocol 0"):
         ChallengeReport.from_json(card.to_json())
-    with pytest.raises(ValueError, match="no card"):
+    with pytest.raises(ValueError, match="not a card"):
         ChallengeReport.from_json(json.dumps({"name": "x"}))

@@ -175,7 +175,7 @@ def test_the_command_plays_compares_and_goes_on(tmp_path):
 
 
 def test_a_policy_that_is_there_twice_is_named():
-    with pytest.raises(ValueError, match="a=still: it is there twice"):
+    with pytest.raises(ValueError, match="a=still: this policy is given twice"):
         CliRunner().invoke(
             app, ["trials", "a=still", "a=still"], catch_exceptions=False
         )

@@ -58,7 +58,7 @@ def test_a_film_of_few_frames_is_written(tmp_path):
 def test_a_film_that_cannot_be_written_says_so(tmp_path):
     path = tmp_path / "a.mkv"
     path.mkdir()
-    with pytest.warns(RuntimeWarning, match="ends after 0 pictures: Is a directory"):
+    with pytest.warns(RuntimeWarning, match="ends after 0 frames: Is a directory"):
         film_for(0.3, path)
 
 
@@ -86,11 +86,11 @@ def test_a_full_disk_ends_the_film_with_a_reason_and_keeps_what_is_there(tmp_pat
         assert reel.trouble == ""
         with largest_file(path.stat().st_size + 2000):
             time.sleep(0.4)
-            assert "pictures: File too large" in reel.trouble
+            assert "frames: File too large" in reel.trouble
         time.sleep(0.2)
         with pytest.warns(RuntimeWarning, match="File too large"):
             reel.close()
-    count = int(re.search(r"ends after (\d+) pictures", reel.trouble)[1])
+    count = int(re.search(r"ends after (\d+) frames", reel.trouble)[1])
     assert count > 5
     assert len(read_times(path)) == count
     # The last picture may be cut; none vanishes without a word.
@@ -142,5 +142,5 @@ def test_a_video_of_a_variable_rate_keeps_its_own_times(tmp_path):
 
 def test_pictures_that_came_too_fast_are_counted(tmp_path, monkeypatch):
     monkeypatch.setattr(film, "MOST", 0)
-    with pytest.warns(RuntimeWarning, match="pictures are missing"):
+    with pytest.warns(RuntimeWarning, match="frames are missing"):
         film_for(0.2, tmp_path / "a.mkv")

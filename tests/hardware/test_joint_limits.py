@@ -29,9 +29,9 @@ def test_the_labs_table_is_within_its_arms_limits():
 def test_joints_that_would_be_too_fast_are_named():
     slow = np.full(6, np.pi)
     slow[1] = 0.5
-    with pytest.raises(ValueError, match=r"joint 1 needs \d+% of the speed"):
+    with pytest.raises(ValueError, match=r"joint 1 needs \d+% of its speed limit"):
         check(JOINTS._replace(speed=slow))
-    with pytest.raises(ValueError, match=r"needs \d+% of the speed"):
+    with pytest.raises(ValueError, match=r"needs \d+% of its speed limit"):
         check(JOINTS, speed=0.8)
 
 
@@ -51,7 +51,7 @@ def test_needed_speeds_are_those_of_the_arm_itself():
     around = SETUP.mounting, np.array(TOOL), home
     # The simulated arm stands two centimetres above the table.
     limits.check_reach(tight, *around, 0.67)
-    with pytest.raises(ValueError, match="of the speed it may have for"):
+    with pytest.raises(ValueError, match="of its speed limit for"):
         limits.check_reach(tight, *around, 0.73)
 
 
@@ -71,8 +71,11 @@ def test_a_table_out_of_reach_is_named():
 @pytest.mark.parametrize(
     ("sent", "words"),
     [
-        ([message(20, b"version")], "hung up"),
-        ([message(20, b"")] + [message(16, message(0, b"x" * 38))] * 30, "no limits"),
+        ([message(20, b"version")], "closed the connection"),
+        (
+            [message(20, b"")] + [message(16, message(0, b"x" * 38))] * 30,
+            "no joint limits",
+        ),
     ],
 )
 def test_a_controller_that_tells_no_limits_is_named(sent, words):

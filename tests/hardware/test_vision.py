@@ -213,7 +213,7 @@ def test_tilted_boards_in_all_parts_of_the_picture_determine_the_lens():
     [
         ({"tilt": 2.0, "spread": 1.0}, "tilted by at most . deg"),
         ({"tilt": 10.0, "spread": 1.0}, "tilted by at most 10 deg"),
-        ({"tilt": 35.0, "spread": 0.1}, "of the picture's width"),
+        ({"tilt": 35.0, "spread": 0.1}, "of the image's width"),
         ({"tilt": 17.0, "spread": 1.0, "far": (1.4, 1.6), "count": 8}, "uncertain by"),
     ],
 )

@@ -28,7 +28,7 @@ def test_a_configuration_survives_its_file(tmp_path):
     path.write_text(config.to_toml())
     assert load_config(PPOConfig, path) == config
     path.write_text("nothing = 1")
-    with pytest.raises(ValueError, match="no training configuration"):
+    with pytest.raises(ValueError, match="not a training configuration"):
         load_config(PPOConfig, path)
 
 

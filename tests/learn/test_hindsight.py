@@ -59,7 +59,7 @@ def test_a_run_that_was_cut_goes_on(tmp_path):
 
 
 def test_a_scenario_without_goals_is_named():
-    with pytest.raises(ValueError, match=r"juggle: it has no goals.*hit_goal.*reach"):
+    with pytest.raises(ValueError, match=r"juggle has no goals.*hit_goal.*reach"):
         hindsight_config("juggle", {})
 
 
@@ -72,7 +72,7 @@ def test_a_run_shorter_than_an_episode_is_named(tmp_path):
 
 def test_the_command_refuses_recordings(tmp_path):
     command = ["train", "reach", "--algo", "sac_her", "--data", str(tmp_path)]
-    with pytest.raises(ValueError, match="sac_her learns by playing"):
+    with pytest.raises(ValueError, match="sac_her learns in simulation"):
         CliRunner().invoke(app, command, catch_exceptions=False)
 
 

@@ -145,8 +145,8 @@ def test_a_run_that_was_cut_off_goes_on(expert, tmp_path):
         ({"expectile": 2.0}, "expectile: 2.0"),
         ({"scenario": "touch"}, "scenario: 'touch', but the recordings are of 'reach'"),
         ({"worlds": 3}, "worlds"),
-        ({"seat": 4}, "there is no seat 4"),
-        ({"seat": "x"}, "there is no seat 'x'"),
+        ({"seat": 4}, "seat: 4 does not exist"),
+        ({"seat": "x"}, "seat: 'x' does not exist"),
         ({"hidden": 256}, "hidden: 256; expected a list"),
         ({"hidden": [64.5]}, r"hidden\[0\]: 64.5; expected a finite whole"),
         ({"batch_size": 32.0}, "batch_size: 32.0; expected a finite whole number"),
@@ -163,7 +163,7 @@ def test_bad_settings_are_named(expert, tmp_path, change, words):
 
 @pytest.mark.parametrize("name", ["scenario", "algo", "data"])
 def test_what_is_no_setting_is_not_taken_for_one(expert, name):
-    with pytest.raises(ValueError, match=f"{name}: it is no setting"):
+    with pytest.raises(ValueError, match=f"{name}: this is an argument"):
         make_config("bc", "reach", [expert], {name: "touch"})
 
 
@@ -224,10 +224,10 @@ def test_data_that_does_not_fit_is_named(expert, tmp_path):
         offline_config("cql", [expert], {})
     with pytest.raises(ValueError, match="no such file"):
         offline_config("bc", ["nowhere"], {})
-    with pytest.raises(ValueError, match="there are no recordings"):
+    with pytest.raises(ValueError, match="it contains no recording"):
         offline_config("bc", [tmp_path], {})
     record(tmp_path, "still", "touch", 2)
-    with pytest.raises(ValueError, match="scenario is 'touch', that of"):
+    with pytest.raises(ValueError, match="scenario is 'touch', but in"):
         offline_config("bc", [expert, tmp_path], {})
 
 

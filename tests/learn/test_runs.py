@@ -79,7 +79,7 @@ def test_it_learned_to_touch(touch_run):
 
 
 def test_a_finished_run_is_not_overwritten(touch_run):
-    with pytest.raises(ValueError, match="holds a run already"):
+    with pytest.raises(ValueError, match="contains a run already"):
         run_training(preset("touch", SMALL), touch_run)
     steps = rows(touch_run)[-1]["steps"]
     assert int(run_training(None, touch_run)["steps"]) == int(steps)
@@ -87,7 +87,7 @@ def test_a_finished_run_is_not_overwritten(touch_run):
 
 def test_a_folder_with_other_things_is_refused_and_kept(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(ValueError, match="holds other things: say another folder"):
+    with pytest.raises(ValueError, match="contains other files: choose another"):
         ah.train("touch", tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
@@ -234,7 +234,7 @@ def test_one_process_at_a_time_trains_in_a_folder(begun_run):
 
 def test_weights_of_another_size_are_named(begun_run, tmp_path):
     config = preset("juggle", {**SMALL, "init": str(begun_run), "observe": "history"})
-    with pytest.raises(ValueError, match=r"another size; it is of another sc"):
+    with pytest.raises(ValueError, match=r"another size; it was trained"):
         run_training(config, tmp_path / "other")
 
 

@@ -109,6 +109,6 @@ def test_a_consent_that_cannot_be_saved_admits_nobody(tmp_path):
     study = open_study(plan_writer(tmp_path)(), out)
     client = enter(study, "a")
     out.write_text("a file is in the way")
-    with pytest.raises(ValueError, match="nothing can be saved"):
+    with pytest.raises(ValueError, match="data cannot be stored"):
         consent(study, client)
     assert stage(study, client)["stage"] == "consent"

@@ -21,9 +21,11 @@ def test_who_remains_is_offered_ways_on(browser):
         wait(one, "s.phase === 'play'")
         other.close()
         wait(one, "s.phase === 'pause'")
-        one.wait_for_function(f"{DETAIL}.startsWith('A player has gone. You can')")
+        one.wait_for_function(
+            f"{DETAIL}.startsWith('A player has disconnected. You can')"
+        )
         assert one.locator("#stop").is_visible()
-        one.get_by_role("button", name="Go on against the computer").click()
+        one.get_by_role("button", name="Continue against the computer").click()
         wait(one, "s.phase === 'play' && s.seats[1].driver === 'zoo/duel'")
         assert one.locator(".seat").nth(1).inner_text() == "Computer, trained"
         one.locator("#leave").click()
@@ -44,7 +46,7 @@ def test_a_level_game_is_explained_and_a_golden_goal_offered(browser):
         page.locator("#go").click()
         wait(page, "s.phase === 'done'")
         page.wait_for_function(f"{HEADLINE} === 'A draw'")
-        assert page.evaluate(DETAIL) == "Nobody is ahead: goals 0 : 0, shots 0 : 0."
+        assert page.evaluate(DETAIL) == "Same score: goals 0 : 0, shots 0 : 0."
         page.locator("#golden").click()
         wait(page, "s.phase === 'play' && s.golden_goal")
         assert "next goal wins" in page.locator("#name").inner_text()
@@ -60,7 +62,7 @@ def test_a_slow_link_shows_fresh_frames_and_says_so(browser):
         slow = page_at(browser, f"http://127.0.0.1:{link.port}/", [])
         direct.locator("#go").click()
         time.sleep(8.0)
-        slow.get_by_text("slow: 10 pictures a second").wait_for()
+        slow.get_by_text("slow link: 10 frames per second").wait_for()
         ages = ages_of(slow, direct)
         assert len(ages) > 50
         assert max(ages) < 500.0, "ms"

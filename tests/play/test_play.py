@@ -93,7 +93,7 @@ def test_two_people_and_a_watcher():
     assert json.loads(watcher.frame)["watching"] == 1
     session.disconnect(clients[0])
     assert match.phase == "pause"
-    assert match.reason == "a player has gone"
+    assert match.reason == "a player has disconnected"
     back = session.connect()
     session.receive(back, line("hello", key="0"))
     assert back.seat == 0, "a page that is loaded again gets its seat back"
@@ -142,7 +142,7 @@ def test_opponents_are_chosen_between_matches_and_ends_change():
     assert match.drivers.names[0] == "allround:strength=weak", "not during a match"
     with pytest.raises(ValueError, match="unknown driver"):
         LiveMatch("duel", {"paddle_1": "nobody"}, {})
-    with pytest.raises(ValueError, match="say person"):
+    with pytest.raises(ValueError, match="use person"):
         LiveMatch("duel", {"paddle_1": "mouse"}, {})
     with pytest.raises(ValueError, match="path"):
         LiveMatch("duel", {"paddle_1": "policy"}, {})

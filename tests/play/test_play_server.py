@@ -34,8 +34,8 @@ BAD = {
     '{"t":"aim"}': "aim: fields must be ['held', 'q', 'rtt', 'x', 'y']",
     '{"t":"aim","x":0,"y":0,"q":1}': "aim: fields must be",
     '{"t":"aim","x":0,"y":0,"held":0,"q":1,"rtt":0,"z":1}': "aim: fields must be",
-    '{"t":"aim","x":NaN,"y":0,"held":0,"q":1,"rtt":0}': "NaN is no number",
-    '{"t":"aim","x":Infinity,"y":0,"held":0,"q":1,"rtt":0}': "Infinity is no number",
+    '{"t":"aim","x":NaN,"y":0,"held":0,"q":1,"rtt":0}': "NaN is not a number",
+    '{"t":"aim","x":Infinity,"y":0,"held":0,"q":1,"rtt":0}': "Infinity is not a number",
     '{"t":"aim","x":1e300,"y":0,"held":0,"q":1,"rtt":0}': "x: must be a number",
     '{"t":"aim","x":"0","y":0,"held":0,"q":1,"rtt":0}': "x: must be a number",
     '{"t":"aim","x":true,"y":0,"held":0,"q":1,"rtt":0}': "x: must be a number",
@@ -58,7 +58,7 @@ def test_chatter_is_cut_short():
     limiter = RateLimiter(0.0)
     for _ in range(int(BURST)):
         limiter.acquire(0.0)
-    with pytest.raises(ValueError, match="messages a second"):
+    with pytest.raises(ValueError, match="messages per second"):
         limiter.acquire(0.0)
     limiter.acquire(1.0)
 

@@ -76,9 +76,9 @@ def test_a_function_of_goals_and_one_of_pixels_drive():
         ),
         (lambda seen: seen["puck"], "IndexError"),
         (torch.nn.Linear(5, 2), "cannot be multiplied"),
-        (7, "int 7 is no player"),
-        (Plain, "a class that is no Driver"),
-        (None, "None is no player"),
+        (7, "int 7 is not a driver"),
+        (Plain, "the class is not a Driver"),
+        (None, "None is not a driver"),
     ],
 )
 def test_a_player_that_does_not_fit_is_refused_when_built(player, message):

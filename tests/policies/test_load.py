@@ -90,7 +90,7 @@ def test_an_onnx_policy_of_a_fixed_batch_gets_a_row_at_a_time(tmp_path):
         ({"outputs": 3}, r"expected actions of shape \(2, 2\), got \(2, 3\)"),
         (
             {"batch": 64},
-            "its batch is fixed to 64: export it with a dynamic first axis",
+            "its batch size is fixed to 64: export it with a dynamic first axis",
         ),
         ({"inputs": 2}, r"expected one input, float32 \(B, D\); found 2 inputs"),
         ({"kind": onnx.TensorProto.DOUBLE}, r"found tensor\(double\) of shape"),
@@ -126,5 +126,5 @@ def test_an_exported_policy_is_one_small_file(tmp_path):
         np.clip(driver.predict(seen, True), -1, 1), mean, atol=1e-5
     )
     (tmp_path / "bad.npz").write_bytes(b"nothing")
-    with pytest.raises(ValueError, match="no policy of ours"):
+    with pytest.raises(ValueError, match="is not a policy file"):
         NumpyPolicy.load(tmp_path / "bad.npz")

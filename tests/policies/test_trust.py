@@ -99,7 +99,7 @@ def test_arrays_are_counted_before_they_are_allocated(tmp_path):
         archive.open("weight_0.npy", "w") as file,
     ):
         np.lib.format.write_array_header_1_0(file, header)
-    with pytest.raises(ValueError, match=r"no policy of ours: .*in 0 bytes"):
+    with pytest.raises(ValueError, match=r"is not a policy file: .*in 0 bytes"):
         NumpyPolicy.load(tmp_path / "big.npz")
 
 
@@ -143,7 +143,7 @@ def written(path, **changes):
 )
 def test_what_is_no_policy_is_refused_when_it_is_read(changes, tmp_path):
     assert load_policy(written(tmp_path / "good.npz")).shape == (8,)
-    with pytest.raises(ValueError, match="is no policy of ours"):
+    with pytest.raises(ValueError, match="is not a policy file"):
         load_policy(written(tmp_path / "bad.npz", **changes))
 
 
@@ -158,7 +158,7 @@ def test_broken_and_disguised_arrays_are_refused(tmp_path):
     }.items():
         path = tmp_path / f"{name}.npz"
         path.write_bytes(content)
-        with pytest.raises(ValueError, match="is no policy of ours"):
+        with pytest.raises(ValueError, match="is not a policy file"):
             load_policy(path)
 
 

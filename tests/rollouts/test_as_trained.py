@@ -69,7 +69,7 @@ def test_code_that_was_not_trained_with_is_refused(gentle_run, tmp_path):
     text = file.read_text()
     try:
         file.write_text(text + "\n# changed\n")
-        with pytest.raises(ValueError, match=r"not trained with as it is, .*gentle.py"):
+        with pytest.raises(ValueError, match=r"its current state, .*gentle.py"):
             ah.evaluate(gentle_run, episodes=1)
         assert ah.evaluate(gentle_run, str(file), episodes=1).profile == "gantry"
     finally:
@@ -109,12 +109,14 @@ def test_a_task_that_is_gone_is_named(gentle_run):
     file = gentle_run.parent / "gentle.py"
     kept = file.rename(file.with_suffix(".kept"))
     try:
-        with pytest.raises(ValueError, match=r"gentle\.py, and there is no such file"):
+        with pytest.raises(ValueError, match=r"gentle\.py, but this file does"):
             ah.evaluate(gentle_run, episodes=1)
     finally:
         kept.rename(file)
 
 
 def test_the_measured_seat_takes_no_other_driver():
-    with pytest.raises(ValueError, match="paddle_0 is the seat of the driver that is"):
+    with pytest.raises(
+        ValueError, match="paddle_0 is the seat of the evaluated driver"
+    ):
         ah.evaluate("striker", "touch", episodes=1, drivers={"paddle_0": "still"})

@@ -129,4 +129,4 @@ def test_check_compares_a_recording_with_its_replay(tmp_path):
     pq.write_table(table.set_column(column, "reward", changed), part)
     done = CliRunner().invoke(app, ["data", "check", "--replay", str(tmp_path / "r")])
     assert done.exit_code == 1
-    assert "reward differs by 0.5 from what its states" in " ".join(done.output.split())
+    assert "reward differs by 0.5 from the value of" in " ".join(done.output.split())

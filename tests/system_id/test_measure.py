@@ -57,7 +57,7 @@ def test_training_begins_with_the_weights_of_a_run(tmp_path):
     with pytest.raises(ValueError, match="rllib cannot begin"):
         preset("reach", {**SMALL, "init": "x", "engine": "rllib"})
     lost = preset("reach", {**SMALL, "init": str(tmp_path / "nowhere")})
-    with pytest.raises(ValueError, match="no folder of a run"):
+    with pytest.raises(ValueError, match="not the folder of a run"):
         run_training(lost, tmp_path / "lost")
 
 
@@ -68,7 +68,7 @@ def test_transfer_goes_on_with_what_was_cut_off(tmp_path, monkeypatch):
     for wrong, words in (
         (["--profile", "real"], "unknown profile 'real'"),
         (["--to", "numba,mujoco"], "unknown backend 'mujoco'"),
-        (["--policy", "still", "--fine-tune", "64"], "none is the folder of a run"),
+        (["--policy", "still", "--fine-tune", "64"], "is a folder of a run"),
     ):
         with pytest.raises(ValueError, match=words):
             app([*ask, *wrong], standalone_mode=False)
@@ -89,7 +89,7 @@ def test_transfer_goes_on_with_what_was_cut_off(tmp_path, monkeypatch):
         app(ask, standalone_mode=False)
     with pytest.raises(ValueError, match="--trust"):
         app(ask, standalone_mode=False)
-    with pytest.raises(ValueError, match="holds another run"):
+    with pytest.raises(ValueError, match="contains a run with other settings"):
         app([*ask, "--seed", "1"], standalone_mode=False)
     with pytest.raises(RuntimeError, match="cut off"):
         app([*ask, "--trust"], standalone_mode=False)

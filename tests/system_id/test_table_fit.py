@@ -161,7 +161,7 @@ def test_a_table_of_which_nothing_is_found_gets_no_file(tmp_path):
     path, out = tmp_path / "rows.csv", tmp_path / "mine.toml"
     path.write_text("t,x,y\n" + "".join(f"{k * 0.01},0.1,0\n" for k in range(100)))
     result = CliRunner().invoke(app, ["fit-table", str(path), "--out", str(out)])
-    assert "nothing of the table could be identified" in str(result.exception)
+    assert "no parameter of the table could be identified" in str(result.exception)
     assert not out.exists()
 
 
@@ -169,11 +169,11 @@ def test_a_table_of_which_nothing_is_found_gets_no_file(tmp_path):
     ("text", "error"),
     [
         ("t,x\n0,1\n", "column 'y' is missing"),
-        ("t,x,y\n0,1,a\n", "line 2: 'a' is no number"),
-        ("t,x,y\n0,1,2\n", "1 rows whose times must grow"),
+        ("t,x,y\n0,1,a\n", "line 2: 'a'; expected a number"),
+        ("t,x,y\n0,1,2\n", "1 rows; expected at least"),
         (
             "t,x,y\n" + "".join(f"{k * 0.1},0,0\n" for k in range(20)),
-            "10 rows a second",
+            "10 rows per second",
         ),
         (
             "t,x,y\n" + "".join(f"{k * 0.01},{k},0\n" for k in range(20)),

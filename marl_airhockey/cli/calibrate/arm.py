@@ -22,23 +22,33 @@ if TYPE_CHECKING:
     from marl_airhockey.hardware.calibration.arm import ArmTrial
 
 NAMES = "action_delay", "servo_time"
-"""Parameters that are measured"""
+"""Parameters that are measured."""
 
 
 def arm(
-    rig: Annotated[Path | None, typer.Option(help="File of the devices.")] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(help="Rig file of a real table: its devices and calibration."),
+    ] = None,
     repeats: Annotated[
-        int, typer.Option(help="Times that each motion is made, 10 s each.", min=1)
+        int,
+        typer.Option(
+            help="Number of repetitions of each of the four motions; one takes about "
+            "10 s.",
+            min=1,
+        ),
     ] = 2,
     plot: Annotated[
-        Path | None, typer.Option(help="Write a PNG of gain and phase.")
+        Path | None,
+        typer.Option(help="PNG file to write with a plot of gain and phase."),
     ] = None,
     lab: LabOption = False,
     as_json: AsJson = False,
 ) -> None:
-    """Measure how an arm follows: its dead time and its lag, by steps and chirps.
+    """Measure the dead time and the lag of an arm by steps and chirps.
 
-    It moves along both axes of the table, by 8 cm to each side and as far as 0.4 m/s.
+    The arm moves along both axes of the table, by up to 8 cm to each side and with up
+    to 0.4 m/s.
     """
     from marl_airhockey.hardware.calibration.arm import measure_arm
 
@@ -54,7 +64,9 @@ def arm(
         rows = [vars(trial) for trial in trials]
         console.print_json(json.dumps({**values, "trials": rows}))
         return
-    table = Table("motion", "axis", "dead time, ms", "half-rise, ms", "model off, mm")
+    table = Table(
+        "motion", "axis", "dead time, ms", "time to 50 %, ms", "model error, mm"
+    )
     for trial in trials:
         found = trial.action_delay, trial.servo_time, trial.misfit
         cells = (f"{1e3 * value:.1f}" for value in found[:2])
@@ -64,13 +76,13 @@ def arm(
 
 
 def _response(trials: Sequence[ArmTrial]) -> dict[float, Array]:
-    """Return mean gain and phase, degrees, by frequency, of all chirps."""
+    """Return the mean gain and phase (deg) of all chirps, by frequency (Hz)."""
     chirps = [trial.response for trial in trials if trial.response]
     return {f: np.mean([chirp[f] for chirp in chirps], 0) for f in chirps[0]}
 
 
 def _in_words(trials: Sequence[ArmTrial]) -> str:
-    """Return gain and phase at each frequency."""
+    """Return a text with gain and phase at each frequency."""
     parts = [
         f"{f:g} Hz: {gain:.2f}, {phase:.0f} deg"
         for f, (gain, phase) in _response(trials).items()
@@ -79,14 +91,14 @@ def _in_words(trials: Sequence[ArmTrial]) -> str:
 
 
 def _plot(trials: Sequence[ArmTrial], values: dict[str, Any], path: Path) -> None:
-    """Write measured gain and phase, and the model's, as a PNG."""
+    """Write a PNG with the measured gain and phase and those of the model."""
     require("matplotlib", "train")
     import matplotlib.pyplot as plt
 
     from marl_airhockey.sim.render.charts import DPI, INK, save, tidy
 
     f = np.linspace(0.5, 5.0, 200)
-    # A critically damped lag: both of its poles lie at this frequency.
+    # Both poles of a critically damped lag are at this frequency.
     angle = 2 * np.pi * f * values["servo_time"]["mean"] / HALF
     phase = -2 * np.arctan(angle) - 2 * np.pi * f * values["action_delay"]["mean"]
     model = (1 / (1 + angle**2), np.degrees(phase))

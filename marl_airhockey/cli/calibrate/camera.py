@@ -24,41 +24,66 @@ if TYPE_CHECKING:
     from marl_airhockey.hardware.lab.lab import LabClient
 
 TOOL = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
-"""Pose of the paddle's foot in the flange's frame, m and rad"""
+"""Pose of the paddle's foot, flange frame, m and rad."""
 
-calibrate = typer.Typer(help="Calibrate a camera, a table and an arm, on a page.")
+calibrate = typer.Typer(
+    help="Calibrate a camera, a table and an arm, on a page in the browser.\n\n"
+    "The steps are lens, table, puck, paddle and arm. The last step writes one rig "
+    "file. --hand calibrates the camera of a hand for teleop --by shadow. Its steps "
+    "are lens, field and paddle."
+)
 
 
 @calibrate.callback(invoke_without_command=True)
 def open_calibration(
     context: typer.Context,
-    out: Annotated[Path, typer.Option(help="File that is written.")] = Path("rig.json"),
+    out: Annotated[
+        Path,
+        typer.Option(help="Rig file to write; with --hand by default hand.json."),
+    ] = Path("rig.json"),
     camera: Annotated[
-        str, typer.Option(help="v4l2:NUMBER, stream:PORT or a video.")
+        str,
+        typer.Option(help="Camera: v4l2:NUMBER, stream:PORT or the path of a video."),
     ] = "v4l2:0",
-    robot: Annotated[str, typer.Option(help="Address of the arm's controller.")] = "",
-    table: Annotated[str, typer.Option(help="Preset of the table.")] = "full_size",
+    robot: Annotated[
+        str,
+        typer.Option(
+            help="Network address of the arm's controller; required without --lab and "
+            "--hand."
+        ),
+    ] = "",
+    table: Annotated[
+        str,
+        typer.Option(
+            help="Preset of the table: standard, full_size, ubc_pro or ubc_wood."
+        ),
+    ] = "full_size",
     tags: Annotated[
         Path | None,
-        typer.Option(help="CSV of measured tags: number,x,y (m, table frame)."),
+        typer.Option(
+            help="CSV file with the measured centres of the tags: number,x,y (m, table "
+            "frame)."
+        ),
     ] = None,
     hand: Annotated[
-        bool, typer.Option("--hand", help="A camera over a hand's field, without arm.")
+        bool,
+        typer.Option(
+            "--hand", help="Calibrate the camera over a hand's field, without an arm."
+        ),
     ] = False,
     field: Annotated[
-        str, typer.Option(help="Of --hand: length x width of the field, m.")
+        str,
+        typer.Option(help="Size of the hand's field for --hand, LENGTHxWIDTH, m."),
     ] = "0.5x0.6",
     lab: Annotated[
-        bool, typer.Option("--lab", help="The virtual lab's camera and arm.")
+        bool,
+        typer.Option("--lab", help="Use the camera and the arm of the virtual lab."),
     ] = False,
     host: cli_play.Host = "127.0.0.1",
     port: cli_play.Port = 8490,
     browser: cli_play.Browser = True,
 ) -> None:
-    """Calibrate, step by step: lens, table, puck, paddle, arm; one file in the end.
-
-    --hand calibrates the camera of a hand (teleop --by shadow): lens, field, paddle.
-    """
+    """Calibrate a camera, a table and an arm, on a page in the browser."""
     if context.invoked_subcommand is not None:
         return
     require("starlette", "play")
@@ -77,9 +102,11 @@ def open_calibration(
     from marl_airhockey.hardware.calibration.session import CalibrationSession
 
     if table not in TABLES:
-        raise ValueError(f"--table {table!r}: there are {', '.join(TABLES)}")
+        raise ValueError(f"--table {table!r}: expected one of {', '.join(TABLES)}")
     if not lab and not robot:
-        raise ValueError("--robot: the address of the arm's controller, or take --lab")
+        raise ValueError(
+            "no arm was given; add --robot with the address of its controller, or --lab"
+        )
     with _devices(lab, camera, robot) as (source, address, operator, client):
         rig = {"table": table, "camera": source, "robot": address, "tool": TOOL}
         rig["operator"] = operator
@@ -101,7 +128,7 @@ def open_calibration(
 def _hand_session(
     camera: str, size: tuple[float, float], out: Path, tags: Path | None, lab: bool
 ) -> Iterator[HandSession]:
-    """Give the session of a hand's camera; in a lab, with its hand."""
+    """Yield the calibration session of a hand's camera, with the hand of a lab."""
     from marl_airhockey.hardware.calibration.hand_session import HandSession
 
     measured = _read_tags(tags) if tags else None
@@ -120,23 +147,27 @@ def _hand_session(
 
 
 def _size(text: str) -> tuple[float, float]:
-    """Return length and width of a text LENGTHxWIDTH.
+    """Return length and width, m, of a text LENGTHxWIDTH.
 
     Raises:
-        ValueError: another text.
+        ValueError: The text has another form.
     """
     try:
         length, width = (float(part) for part in text.split("x"))
     except ValueError:
         length = width = 0.0
     if not min(length, width) > 0.0:
-        raise ValueError(f"--field {text!r}: expected LENGTHxWIDTH in m, as 0.5x0.6")
+        raise ValueError(
+            f"--field {text!r}: expected LENGTHxWIDTH in m, for example 0.5x0.6"
+        )
     return length, width
 
 
 @calibrate.command()
 def sheets(
-    folder: Annotated[Path, typer.Argument(help="Where they are written.")] = Path(),
+    folder: Annotated[
+        Path, typer.Argument(help="Folder in which the files are written.")
+    ] = Path(),
 ) -> None:
     """Write the tags and the ChArUco board as PDF files for A4 paper."""
     from marl_airhockey.hardware.calibration.sheets import write_sheets
@@ -149,7 +180,7 @@ def sheets(
 def _devices(
     lab: bool, camera: str, robot: str
 ) -> Iterator[tuple[str, str, str, LabClient | None]]:
-    """Give camera, robot and operator as a rig names them, and a lab's client."""
+    """Yield camera, robot and operator as in a rig file, and the client of a lab."""
     if not lab:
         yield camera, robot, "person", None
         return
@@ -157,7 +188,7 @@ def _devices(
     from marl_airhockey.hardware.calibration.lab_rig import running_lab
 
     with (
-        waiting("opening the lab (longer when it is the first time)"),
+        waiting("opening the lab (the first time takes longer)"),
         running_lab() as client,
     ):
         info = client.ask("info")
@@ -166,17 +197,17 @@ def _devices(
 
 
 def _pose_reader(address: str) -> Callable[[], Array]:
-    """Return a function that reads the pose of an arm's tool."""
+    """Return a function that returns the pose of the arm's tool."""
     from marl_airhockey.hardware.robot.ur5e import PoseReader
 
     return PoseReader(address).pose
 
 
 def _read_tags(path: Path) -> dict[int, Array]:
-    """Read the measured places of tags.
+    """Return the corners (4, 2) of the measured tags, table frame, m, by number.
 
     Raises:
-        ValueError: a file that cannot be read, or a line that is none, named.
+        ValueError: The file cannot be read, or a line has another form.
     """
     found: dict[int, Array] = {}
     try:
@@ -188,5 +219,7 @@ def _read_tags(path: Path) -> dict[int, Array]:
             number, x, y = line.split(",")
             found[int(number)] = tag_corners(np.array([float(x), float(y)]))
         except ValueError:
-            raise ValueError(f"--tags {path}: {line!r} is no number,x,y") from None
+            raise ValueError(
+                f"--tags {path}: line {line!r}; expected number,x,y"
+            ) from None
     return found

@@ -20,24 +20,27 @@ if TYPE_CHECKING:
     from marl_airhockey.hardware.calibration.delay import Delays
 
 NAMES = "camera", "arm", "round trip"
-"""Delays that are measured"""
+"""Names of the delays that are measured."""
 
 
 def delay(
     rig: Annotated[
-        Path | None, typer.Option(help="File of the devices; its latency is written.")
+        Path | None,
+        typer.Option(help="Rig file of a real table: its devices and calibration."),
     ] = None,
-    trials: Annotated[int, typer.Option(help="How many, a second each.", min=5)] = 200,
+    trials: Annotated[
+        int, typer.Option(help="Number of trials of one second.", min=5)
+    ] = 200,
     plot: Annotated[
-        Path | None, typer.Option(help="Write a PNG of the histograms.")
+        Path | None, typer.Option(help="PNG file to write with the histograms.")
     ] = None,
     lab: LabOption = False,
     as_json: AsJson = False,
 ) -> None:
-    """Measure how late pictures come and how late the arm is, by the arm's own motion.
+    """Measure the latency of the camera and of the arm by movements of the arm.
 
-    The arm goes to and fro by 9 cm; a camera of this machine gets its latency written
-    into the rig's file.
+    The arm moves back and forth by 9 cm. If the camera is a v4l2 device, its mean
+    latency is written to the rig file.
     """
     from marl_airhockey.hardware.calibration.delay import measure_delays
 
@@ -60,7 +63,7 @@ def delay(
 
 
 def _plot(found: Delays, path: Path) -> None:
-    """Write the histograms of delays as a PNG."""
+    """Write a PNG with the histograms of the delays."""
     require("matplotlib", "train")
     import matplotlib.pyplot as plt
 

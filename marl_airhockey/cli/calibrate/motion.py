@@ -1,4 +1,4 @@
-"""What the commands share that move an arm to measure it."""
+"""Code that is shared by the commands that move an arm to measure it."""
 
 from __future__ import annotations
 
@@ -19,16 +19,15 @@ from marl_airhockey.types import Array
 def moving_arm(
     lab: bool, rig: Path | None, motions: int
 ) -> Iterator[tuple[Rig, Path, Callable[[int], None]]]:
-    """Give an arm that a person has allowed to move.
+    """Open the table of an arm and wait until its operator confirms the motions.
 
     Args:
-        lab: whether it is the virtual lab's.
-        rig: file of the devices of another.
-        motions: number of them.
+        lab: True for the virtual lab.
+        rig: Rig file of another table.
+        motions: Number of motions, for the progress bar.
 
     Yields:
-        Its devices, their file, and a function that is called with the number of
-        motions that are done.
+        Rig, its file, and a function that takes the number of completed motions.
     """
     require("rtde_control", "hardware")
     from marl_airhockey.hardware.table.operator import make_operator
@@ -43,7 +42,7 @@ def moving_arm(
 
 
 def summarize(values: Array) -> dict[str, float]:
-    """Return mean, standard deviation, least and most of values (n,)."""
+    """Return mean, standard deviation, minimum and maximum of values (n,)."""
     return {
         "mean": float(values.mean()),
         "sd": float(values.std()),

@@ -1,4 +1,4 @@
-"""Commands ``airhockey data`` that make recordings and datasets of others."""
+"""Commands ``airhockey data`` that convert recordings and datasets."""
 
 from __future__ import annotations
 
@@ -14,10 +14,15 @@ from marl_airhockey.sim.core.errors import require
 
 
 def repair(
-    recording: Annotated[Path, typer.Argument(help="Recording.")],
-    out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the new one.")],
+    recording: Annotated[Path, typer.Argument(help="Folder of a recording.")],
+    out: Annotated[
+        Path, typer.Option(file_okay=False, help="Folder of the new recording.")
+    ],
 ) -> None:
-    """Write the good episodes of a recording as a new one; the old one stays."""
+    """Write the intact episodes of a recording as a new recording.
+
+    The old recording is not changed.
+    """
     from marl_airhockey.data.derived import repaired
 
     for words in repaired(recording, out):
@@ -27,13 +32,16 @@ def repair(
 
 def merge(
     paths: Annotated[
-        list[Path], typer.Argument(help="Recordings, or folders of them.")
+        list[Path],
+        typer.Argument(
+            help="Recordings, folders of recordings, or names of built datasets."
+        ),
     ],
     out: Annotated[
         Path, typer.Option(file_okay=False, help="Folder of the new recording.")
     ],
 ) -> None:
-    """Write recordings of one kind as one recording."""
+    """Merge recordings of the same environment into one recording."""
     from marl_airhockey.data.derived import merged
     from marl_airhockey.data.files import whole_recordings_in
 
@@ -42,16 +50,21 @@ def merge(
 
 
 def split(
-    recording: Annotated[Path, typer.Argument(help="Recording.")],
+    recording: Annotated[Path, typer.Argument(help="Folder of a recording.")],
     out: Annotated[
-        Path, typer.Option(file_okay=False, help="Folder of the two: train and test.")
+        Path,
+        typer.Option(
+            file_okay=False,
+            help="Folder of the two new recordings, which are named train and test.",
+        ),
     ],
     test: Annotated[
-        float, typer.Option(help="Fraction of the episodes that go to test.")
+        float,
+        typer.Option(help="Fraction of the episodes in the recording test, 0..1."),
     ] = 0.1,
-    seed: Annotated[int, typer.Option(help="Seed of the random division.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random split.")] = 0,
 ) -> None:
-    """Divide the episodes of a recording into two, at random."""
+    """Split the episodes of a recording at random into train and test."""
     from marl_airhockey.data.derived import divided
     from marl_airhockey.data.files import one_recording
 
@@ -59,24 +72,31 @@ def split(
 
 
 def relabel(
-    recording: Annotated[Path, typer.Argument(help="Recording.")],
+    recording: Annotated[Path, typer.Argument(help="Folder of a recording.")],
     out: Annotated[
         Path, typer.Option(file_okay=False, help="Folder of the new recordings.")
     ],
     task: Annotated[
         list[str] | None,
-        typer.Option(help="Scenario, repeatable; all that fit if none is given."),
+        typer.Option(
+            help="Name of the new scenario; by default all fitting scenarios. Can be "
+            "repeated."
+        ),
     ] = None,
     hindsight: Annotated[
         int,
         typer.Option(
-            help="Copies of each episode with goals that it reached; 0 for the goals "
-            "of the task.",
+            help="Number of copies of each episode whose goals are replaced by goals "
+            "that it reached; 0 keeps the goals of the task.",
             min=0,
         ),
     ] = 0,
 ) -> None:
-    """Write a recording as data of other tasks with the same bodies, by name."""
+    """Write a recording as data of other scenarios with the same bodies.
+
+    Rewards, success and observations are computed again for each scenario. The new
+    recordings have the names of the scenarios.
+    """
     from marl_airhockey.data.files import one_recording
     from marl_airhockey.data.hindsight import with_hindsight
     from marl_airhockey.data.relabel import fitting, relabelled
@@ -94,17 +114,22 @@ def relabel(
 
 def extract(
     video: Annotated[
-        Path, typer.Argument(help="A video of a table, or a recording with one.")
+        Path,
+        typer.Argument(help="Video of a table, or folder of a recording with one."),
     ],
     rig: Annotated[
-        Path | None, typer.Option(help="File of the table's devices; the recording's.")
+        Path | None,
+        typer.Option(help="Rig file of the table; by default that of the recording."),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(file_okay=False, help="Folder of CSV and plot; the video's own."),
+        typer.Option(
+            file_okay=False,
+            help="Folder of the CSV file and the plot; by default that of the video.",
+        ),
     ] = None,
 ) -> None:
-    """Find where puck and paddle were in each picture; write a CSV and a plot."""
+    """Detect puck and paddle in each frame of a video; write a CSV file and a plot."""
     require("matplotlib", "train")
     from marl_airhockey.data.extract import extract as find_trajectories
     from marl_airhockey.data.plots import plot_trajectories
@@ -121,7 +146,7 @@ def extract(
         longest = max((end - begin for begin, end in gaps), default=0.0)
         seen = np.isfinite(places[:, 0])
         console.print(
-            f"{name}: seen in {seen.sum()} of {len(seen)} pictures, {len(gaps)} gaps, "
+            f"{name}: seen in {seen.sum()} of {len(seen)} frames, {len(gaps)} gaps, "
             f"the longest {longest:.2f} s"
         )
     console.print("files:", rows, plot, soft_wrap=True)
@@ -129,26 +154,36 @@ def extract(
 
 def export(
     paths: Annotated[
-        list[Path], typer.Argument(help="Recordings, or folders of them.")
+        list[Path],
+        typer.Argument(
+            help="Recordings, folders of recordings, or names of built datasets."
+        ),
     ],
     name: Annotated[
-        str, typer.Option(help="Name of the dataset: airhockey/juggle/test-v0.")
+        str,
+        typer.Option(
+            help="Name of the new dataset, for example airhockey/juggle/test-v0."
+        ),
     ],
     to: Annotated[
         str, typer.Option(help="Format: minari, lerobot, hdf5 or rows.")
     ] = "minari",
     seat: Annotated[
         int,
-        typer.Option(help="Seat whose steps are written; -1 for all.", min=-1),
+        typer.Option(
+            help="Index of the seat whose steps are written; -1 for all seats.", min=-1
+        ),
     ] = 0,
     out: Annotated[
         Path | None,
         typer.Option(
-            file_okay=False, help="Folder of all datasets; Minari's, else datasets."
+            file_okay=False,
+            help="Folder of all datasets; by default Minari's own folder for minari, "
+            "else datasets.",
         ),
     ] = None,
 ) -> None:
-    """Write recordings as a dataset that others load without this library."""
+    """Export recordings as a dataset that can be loaded without this library."""
     from marl_airhockey.data.exchange.formats import find_format
     from marl_airhockey.data.files import size_of, whole_recordings_in
 
@@ -162,32 +197,39 @@ def import_dataset(
     source: Annotated[
         str,
         typer.Argument(
-            help="Name of a Minari dataset; folder of a LeRobot dataset; or HDF5 "
-            "trajectories or CSV rows t,x,y, a file or a folder of them."
+            help="Name of a Minari dataset; folder of a LeRobot dataset; or file or "
+            "folder of HDF5 trajectories, or of CSV rows t,x,y (s, m)."
         ),
     ],
     scenario: Annotated[
-        str, typer.Option("--scenario", "-s", help="Scenario that it is of.")
+        str,
+        typer.Option(
+            "--scenario", "-s", help="Name of the scenario to which the data belong."
+        ),
     ],
     out: Annotated[
         Path | None,
         typer.Option(
-            file_okay=False, help="Folder of the recording; recordings/SOURCE."
+            file_okay=False,
+            help="Folder of the new recording; by default recordings/SOURCE.",
         ),
     ] = None,
     option: Options = None,
     root: Annotated[
         Path | None,
         typer.Option(
-            file_okay=False, help="Folder of all Minari datasets; Minari's own."
+            file_okay=False,
+            help="Folder of all Minari datasets; by default Minari's own folder.",
         ),
     ] = None,
     control_dt: Annotated[
         float,
-        typer.Option(help="Time of a step, s, if the data do not give it.", min=1e-4),
+        typer.Option(
+            help="Time of a step, s, for data that do not contain it.", min=1e-4
+        ),
     ] = 0.05,
 ) -> None:
-    """Write a dataset of others as a recording, to learn from it or to relabel it."""
+    """Import a dataset of another library as a recording."""
     from marl_airhockey.data.exchange.formats import import_dataset as imported
     from marl_airhockey.data.exchange.settings import ImportSettings
 
@@ -198,4 +240,4 @@ def import_dataset(
 
 
 COMMANDS = (repair, merge, split, relabel, extract, export)
-"""Functions of the commands but `import`, whose name is a word of Python"""
+"""Functions of all commands except `import`, which is a keyword of Python."""

@@ -1,4 +1,4 @@
-"""Commands ``airhockey data`` that make recordings and look into them."""
+"""Commands ``airhockey data`` that write, check and summarize recordings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from marl_airhockey.cli.progress import bar
 from marl_airhockey.sim.core.errors import require
 
 data = typer.Typer(
-    help="Recordings: make them, look into them, sum them up.", no_args_is_help=True
+    help="Write, check, convert and summarize recordings and datasets.",
+    no_args_is_help=True,
 )
 
 
@@ -34,7 +35,8 @@ def record(
     out: Annotated[
         Path | None,
         typer.Option(
-            file_okay=False, help="Folder of the recording; recordings/TIME-SCENARIO."
+            file_okay=False,
+            help="Folder of the recording; by default recordings/TIME-SCENARIO.",
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = 0,
@@ -46,9 +48,9 @@ def record(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Let a driver play and record it: states, observations, actions, rewards.
+    """Record episodes of a driver: states, observations, actions and rewards.
 
-    With --out, a recording that was interrupted is resumed.
+    With --out, an interrupted recording is resumed.
     """
     from marl_airhockey.data.files import new_recording
     from marl_airhockey.data.record import record_episodes
@@ -68,11 +70,14 @@ def record(
 @data.command()
 def info(
     paths: Annotated[
-        list[Path], typer.Argument(help="Recordings, or folders of them.")
+        list[Path],
+        typer.Argument(
+            help="Recordings, folders of recordings, or names of built datasets."
+        ),
     ],
     as_json: AsJson = False,
 ) -> None:
-    """Say what recordings hold; a file that cannot be read is named and skipped."""
+    """Summarize the content of recordings; unreadable files are skipped."""
     from marl_airhockey.data.files import recordings_in
 
     show(recordings_in(paths), as_json)
@@ -82,7 +87,7 @@ def show(paths: list[Path], as_json: bool) -> None:
     """Print a row for each recording.
 
     Raises:
-        ValueError: none of them can be read.
+        ValueError: None of the recordings can be read.
     """
     from marl_airhockey.data.summary import Summary, summarize_recording
 
@@ -115,11 +120,16 @@ def show(paths: list[Path], as_json: bool) -> None:
 @data.command()
 def plot(
     paths: Annotated[
-        list[Path], typer.Argument(help="Recordings, or folders of them.")
+        list[Path],
+        typer.Argument(
+            help="Recordings, folders of recordings, or names of built datasets."
+        ),
     ],
-    out: Annotated[Path, typer.Option(help="Picture, PNG.")] = Path("recordings.png"),
+    out: Annotated[Path, typer.Option(help="PNG file to write.")] = Path(
+        "recordings.png"
+    ),
 ) -> None:
-    """Plot returns, lengths, places, speeds, gaps and players of recordings."""
+    """Plot returns, lengths, positions, speeds, gaps and players of recordings."""
     require("matplotlib", "train")
     from marl_airhockey.data.content_plot import plot_content
     from marl_airhockey.data.files import recordings_in
@@ -131,17 +141,24 @@ def plot(
 @data.command()
 def check(
     paths: Annotated[
-        list[Path], typer.Argument(help="Recordings, or folders of them.")
+        list[Path],
+        typer.Argument(
+            help="Recordings, folders of recordings, or names of built datasets."
+        ),
     ],
     replay: Annotated[
         bool,
         typer.Option(
             "--replay",
-            help="Compute rewards, success and observations again, and compare them.",
+            help="Compute rewards, success and observations from the recorded states, "
+            "and compare them with the recorded values.",
         ),
     ] = False,
 ) -> None:
-    """Read all of recordings and name what is wrong; exit 1 if anything is."""
+    """Read recordings completely and list all faults.
+
+    The exit status is 1 if there is a fault.
+    """
     from marl_airhockey.data.files import recordings_in
     from marl_airhockey.data.film import episodes_without_film
     from marl_airhockey.data.reader import episodes_of, missing_steps
@@ -161,7 +178,7 @@ def check(
             wrong.append(str(error))
             continue
         wrong += [
-            f"{path}: {name} differs by {off:.3g} from what its states give today"
+            f"{path}: {name} differs by {off:.3g} from the value of the recorded states"
             for name, off in sorted(found.items())
             if off > EXACT
         ]
@@ -178,19 +195,29 @@ def check(
 
 @data.command()
 def report(
-    folder: Annotated[Path, typer.Argument(help="Of recordings.")],
+    folder: Annotated[Path, typer.Argument(help="Folder of recordings.")],
     out: Annotated[
         Path | None,
         typer.Option(
-            file_okay=False, help="Folder of the report; the recordings' own."
+            file_okay=False,
+            help="Folder of the report; by default the folder of the recordings.",
         ),
     ] = None,
     scenario: Annotated[
-        str | None, typer.Option("--scenario", "-s", help="Of this one alone.")
+        str | None,
+        typer.Option(
+            "--scenario",
+            "-s",
+            help="Scenario of the recordings to use; required if there are several.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Summarize recordings: results, reactions, shots, limits, a study's answers."""
+    """Summarize recordings of games by player, and the answers of a study.
+
+    The report has score, Elo rating, shots, time at the limits and round trips, with
+    95 % intervals.
+    """
     require("matplotlib", "train")
     from marl_airhockey.play.plots import plot_report
     from marl_airhockey.play.report import summarize

@@ -17,13 +17,19 @@ from marl_airhockey.sim.core.errors import require
 
 def get(
     name: Annotated[
-        str, typer.Argument(help="Name of the dataset: airhockey/juggle/expert-v0.")
+        str,
+        typer.Argument(
+            help="Name of the dataset, for example airhockey/juggle/expert-v0."
+        ),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="New folder; the library's cache.")
+        Path | None,
+        typer.Option(
+            help="New folder for the dataset; by default in the library's cache."
+        ),
     ] = None,
 ) -> None:
-    """Build a named dataset from its seeds, on this machine, and compare it."""
+    """Build a named dataset on this machine and compare it with the published one."""
     require("pyarrow", "data")
     from marl_airhockey.data.benchmark.build import build_dataset, get_dataset
     from marl_airhockey.data.benchmark.catalogue import find_dataset
@@ -48,19 +54,19 @@ def get(
         soft_wrap=True,
     )
     if found.checksum == known.checksum:
-        console.print("content: as published", soft_wrap=True)
+        console.print("content: identical to the published one", soft_wrap=True)
     else:
         console.print(
             f"content: checksum {found.checksum[:12]}, published "
             f"{known.checksum[:12]} (success {known.success:.3f}, return "
-            f"{known.returns:.2f}): other versions or another processor round "
-            "differently",
+            f"{known.returns:.2f}); rounding differs between versions and between "
+            "processors",
             soft_wrap=True,
         )
 
 
 def list_datasets(as_json: AsJson = False) -> None:
-    """List the named datasets, and which of them have been built here."""
+    """List the named datasets, and which of them are built on this machine."""
     from marl_airhockey.data.benchmark.catalogue import datasets
     from marl_airhockey.data.benchmark.content import published
     from marl_airhockey.data.files import dataset_folder

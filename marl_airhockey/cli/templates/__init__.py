@@ -1,1 +1,1 @@
-"""Templates that `airhockey new` copies: each is a whole example that runs."""
+"""Templates that `airhockey new` copies. Each one is a complete example."""

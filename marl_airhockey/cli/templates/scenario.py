@@ -1,4 +1,4 @@
-"""Strike the puck so that it comes off three banks, and touch it again."""
+"""Strike the puck so that it bounces off three walls, and touch it again."""
 
 from __future__ import annotations
 
@@ -20,38 +20,39 @@ from marl_airhockey.toolkit import (
     starts,
 )
 
-# Arrays are (..., *): the axes on the left belong to the caller, who may have one world
-# or thousands, or a recording. Write `[..., 0]` instead of `[:, 0]`, and `np.where`
-# instead of `if`, so that the rules can be compiled. Positions are in metres, in the
-# table frame: its origin is the middle of the table, x points to the far end, y left.
+# Arrays have leading axes `...`: none for one world, one for a batch of worlds, or the
+# steps of a recording. Write `[..., 0]` instead of `[:, 0]`, and `np.where` instead of
+# `if`, so that the rules can be compiled. Positions are in metres, in the table frame:
+# the origin is the centre of the table, x points to the far end, y to the left.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Template(Scenario):
-    """Task that pays for each bank after a strike, and most for the touch at the end.
+    """Task of striking the puck so that it bounces off several walls.
 
-    A touch before the last bank begins the count anew. Say here what is rewarded, and
-    why it cannot be had otherwise.
+    The puck must bounce off ``banks`` walls between two touches. A touch before the
+    last wall bounce resets the count. Describe here what the task rewards, and why
+    there is no easier way to obtain the reward.
     """
 
-    # The fields are the options of the task, `--option banks=2`. A sentence behind each
-    # says what it means; `airhockey list` shows it.
+    # The fields are the options of the task, `--option banks=2`. The docstring of each
+    # field is its description in `airhockey list`.
     seconds: float = 8.0
-    """Length of an episode (s)."""
+    """Length of an episode, s."""
     banks: int = 3
-    """Number of banks between two touches."""
+    """Number of wall bounces between two touches."""
 
     @cached_property
     def scene(self) -> Scene:
-        # Who is on the table: one seat, as a UR5e could hold it, and a puck. A goal is
-        # a `GoalLine`; physical parameters that differ from the table's are named here.
+        # The bodies on the table: one seat with the limits of a UR5e, and a puck. Add
+        # a goal as a `GoalLine`. `physics` overrides physics parameters of the table.
         return Scene(
             self.table_geometry, (self.seat(),), pucks=1, physics={"tilt": 0.0}
         )
 
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        # A first state and memory for each world, drawn from `rng` and nothing else.
-        # Bodies are sorted by kind: paddles, then pucks.
+        # Return the first state and memory of each world. Take all random numbers from
+        # `rng`. Bodies are sorted by kind: paddles, then pucks.
         state = self.scene.still_state(worlds)
         box = partial(starts.uniform_box, rng, self.scene.table)
         state.paddle[:, 0] = box((-0.74, -0.64), starts.PADDLE_Y)
@@ -59,8 +60,8 @@ class Template(Scenario):
         return state, self.initial_memory(state, rng)
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
-        # What the rules must know of the past. Touches are kept for every scenario.
-        # `FromMemory`, below, shows what has a number for each puck.
+        # Quantities that the rules store during an episode. The base class stores
+        # touches. `FromMemory`, below, observes entries with one number per puck.
         worlds = len(rng)
         return {
             **super().initial_memory(state, rng),
@@ -70,8 +71,8 @@ class Template(Scenario):
         }
 
     def update_memory(self, t: Transition) -> Memory:
-        # What changes by a step: `t.before`, `t.after`, `t.memory`, and `t.new_memory`
-        # with the new touches.
+        # Return the entries that change in a step. Inputs: the states `t.before` and
+        # `t.after`, `t.memory`, and `t.new_memory` with the new touches.
         struck = rewards.touched(t.memory)
         touch = (t.new_memory["touches"] > t.memory["touches"]).any(-2)
         banks = t.memory["banks"] + struck[..., None] * t.after.banked.sum(-1)
@@ -81,7 +82,7 @@ class Template(Scenario):
             "done": t.memory["done"] | (touch & (banks >= self.banks)).any(-1),
         }
 
-    # What a seat is shown; bounds, names and scaling follow from it.
+    # Observation of a seat. Bounds, names and scaling are derived from it.
     observation = (
         observables.OwnPaddle(),
         observables.Pucks(),
@@ -90,14 +91,14 @@ class Template(Scenario):
         observables.FromMemory("banks", 0.0, 10.0, 3.0),
     )
 
-    # Terms by name, each (..., seats); their sum is the reward. `airhockey list` shows
-    # what the docstring says of each.
+    # Reward terms by name, each (..., seats). Their sum is the reward. `airhockey list`
+    # prints the description of each term in the docstring.
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return the terms.
+        """Return the reward terms.
 
-        approach: metres by which the paddle came nearer to the puck than before.
-        bank: 0.2 for each bank that counts.
-        success: 3 once.
+        approach: Decrease of the shortest distance between paddle and puck so far, m.
+        bank: 0.2 for each wall bounce that counts.
+        success: 3, once.
         """
         counted = np.minimum(t.new_memory["banks"], self.banks)
         fresh = counted - np.minimum(t.memory["banks"], self.banks)
@@ -111,8 +112,9 @@ class Template(Scenario):
         return t.new_memory["done"]
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the bank shot was struck."""
-        # It must be out of reach of luck: `airhockey evaluate still` and `random` tell.
+        """(...) bool: The puck was touched again after enough wall bounces."""
+        # Chance must not satisfy this rule: check it with `airhockey evaluate still`
+        # and `airhockey evaluate random`.
         return t.new_memory["done"]
 
 

@@ -1,1 +1,1 @@
-"""Named datasets of offline RL, which are built from seeds on the user's machine."""
+"""Named datasets for offline RL, which are built from seeds on the user's machine."""

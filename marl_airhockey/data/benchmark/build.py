@@ -1,4 +1,4 @@
-"""Builder of named datasets: it plays them from their seeds."""
+"""Builder of named datasets, which are played from fixed seeds."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ def build_dataset(
     steps: int = STEPS,
     progress: Callable[[float], None] = lambda done: None,
 ) -> Path:
-    """Play a dataset into a folder, which is there when it is complete.
+    """Play a dataset into a folder, which exists only when it is complete.
 
     Args:
-        dataset: Dataset.
-        folder: New folder.
-        steps: Least number of its steps.
-        progress: Function that is called with the fraction that is done.
+        dataset: Dataset to build.
+        folder: New folder of the dataset.
+        steps: Least number of steps of the dataset.
+        progress: Function that is called with the completed fraction.
 
     Returns:
         ``folder``.
 
     Raises:
-        ValueError: There is such a folder.
+        ValueError: The folder exists.
     """
     with whole_folder(folder) as new:
         done = 0.0
@@ -59,10 +59,10 @@ def build_dataset(
 def get_dataset(
     name: str, progress: Callable[[float], None] = lambda done: None
 ) -> Path:
-    """Return the folder of a named dataset; it is built if it is not there yet.
+    """Return the folder of a named dataset; build the dataset if it does not exist.
 
     Raises:
-        ValueError: There is no dataset of that name.
+        ValueError: No dataset has this name.
     """
     dataset, folder = find_dataset(name), dataset_folder(name)
     if not folder.exists():
@@ -71,6 +71,6 @@ def get_dataset(
 
 
 def built(path: str | Path) -> Path:
-    """Return the folder of recordings that a path or the name of a dataset means."""
+    """Return a path, or the folder of a named dataset, which is built if necessary."""
     named = not Path(path).exists() and str(path).startswith(f"{PREFIX}/")
     return get_dataset(str(path)) if named else Path(path)

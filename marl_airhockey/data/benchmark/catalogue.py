@@ -1,7 +1,7 @@
-"""Catalogue of the named datasets: whose steps each of them holds.
+"""Catalogue of the named datasets and of the drivers in them.
 
 A name is ``airhockey/SCENARIO/TIER-vN``. Each part of a dataset is a recording of one
-player; together they have 100,000 steps or a few more, as episodes are whole.
+driver. A dataset has 100,000 steps or a few more, because its episodes are complete.
 """
 
 from __future__ import annotations
@@ -19,34 +19,34 @@ from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.contracts.driver import Driver
 
 VERSION = 0
-"""Version of all datasets: it grows when players, tasks or physics change"""
+"""Version of all datasets; it is increased when drivers, tasks or physics change."""
 PROFILE = "ideal"
-"""Profile in which all are played"""
+"""Profile of all datasets."""
 STEPS = 100_000
-"""Least number of control steps of a dataset"""
+"""Least number of control steps of a dataset."""
 TASKS = (
     *("reach", "reach_velocity", "touch", "strike", "strike_crowd", "juggle"),
     *("puck_velocity", "move_block", "hit_goal", "hit_goal_velocity"),
 )
-"""Scenarios of the ten tasks"""
+"""Scenarios of the ten tasks."""
 SNAPSHOTS = ("early", "middle", "medium")
-"""Policies of a training run that was stopped at half of the expert's success"""
+"""Policies of a training run that was stopped at half of the expert's success."""
 POLICIES = Path(__file__).parent / "policies"
-"""Folder of these policies"""
+"""Folder of these policies."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """Recording in a dataset: the steps of one player."""
+    """Recording in a dataset, with the steps of one driver."""
 
     player: str
-    """Name of the player in the recording, and of the folder"""
+    """Name of the driver in the recording, and name of the folder."""
     make: Callable[[], Driver]
-    """Maker of the player, which is at ``paddle_0``"""
+    """Function that creates the driver of ``paddle_0``."""
     share: float
-    """Share of the dataset's steps"""
+    """Share of the steps of the dataset."""
     others: Mapping[str, str] = field(default_factory=dict)
-    """Drivers of the other seats, by agent"""
+    """Drivers of the other seats, by agent."""
 
 
 @dataclass(frozen=True)
@@ -57,21 +57,21 @@ class NamedDataset:
     tier: str
     parts: tuple[Part, ...]
     what: str
-    """Description"""
+    """Description of the tier."""
 
     @property
     def name(self) -> str:
-        """Name with prefix and version."""
+        """Full name, with prefix and version."""
         return f"{PREFIX}/{self.scenario}/{self.tier}-v{VERSION}"
 
     def seed(self, part: Part) -> int:
         """Return the seed of the first episode of a part."""
-        # Far from the seeds of tests and evaluations, and from each other.
+        # These seeds differ from those of tests, evaluations and other parts.
         return zlib.crc32(f"{self.name}/{part.player}".encode()) * 1000
 
 
 def snapshot(task: str, level: str) -> Path:
-    """Return the file of a policy that was not trained to the end."""
+    """Return the file of a policy from the middle of a training run."""
     return POLICIES / f"{task}-{level}.npz"
 
 
@@ -84,7 +84,7 @@ def _expert(task: str, share: float) -> Part:
 
 
 def _unfinished(task: str, level: str, share: float) -> Part:
-    # Actions are sampled, as those of a policy in training are.
+    # Actions are sampled, as in training.
     path = snapshot(task, level)
     return Part(level, lambda: load_policy(path, deterministic=False), share)
 
@@ -95,38 +95,38 @@ def _synthetic(policy: str, share: float) -> Part:
 
 TIERS: dict[str, tuple[str, Callable[[str], tuple[Part, ...]]]] = {
     "random": (
-        "actions are uniform in the action box",
+        "actions that are sampled uniformly from the action space",
         lambda task: (_random(1.0),),
     ),
     "medium": (
-        "a PPO policy with about half of the expert's successes, actions sampled",
+        "a PPO policy with about half of the expert's success, with sampled actions",
         lambda task: (_unfinished(task, "medium", 1.0),),
     ),
     "medium-replay": (
-        "policies from the beginning of that training to its end, actions sampled",
+        "policies from the start to the end of that training, with sampled actions",
         lambda task: (
             _random(0.25),
             *(_unfinished(task, level, 0.25) for level in SNAPSHOTS),
         ),
     ),
     "medium-expert": (
-        "half of the steps are of the medium policy, half of the expert",
+        "half of the steps are from the medium policy, half from the expert",
         lambda task: (_unfinished(task, "medium", 0.5), _expert(task, 0.5)),
     ),
     "expert": (
-        "the trained policy of the zoo, mean actions",
+        "the trained policy of the zoo, with mean actions",
         lambda task: (_expert(task, 1.0),),
     ),
     "synthetic-human": (
-        "the expert's intent, late, noisy and inconsistent: a script, and no person",
+        "the expert with latency, noise and errors; a script, not a model of a person",
         lambda task: (_synthetic(f"zoo/{task}", 1.0),),
     ),
 }
-"""Descriptions and parts of the tiers of each task, by name"""
+"""Description and parts of each tier of a task, by name."""
 
 
 def _play() -> tuple[Part, ...]:
-    """Return the parts of play in the duel: different pairs of players."""
+    """Return the parts of the dataset of duels, with different pairs of drivers."""
     players = {
         "zoo-duel": (
             lambda: make_driver("zoo/duel", deterministic=False),
@@ -153,7 +153,7 @@ def datasets() -> dict[str, NamedDataset]:
         for task in TASKS
         for tier, (what, parts) in TIERS.items()
     ]
-    found.append(NamedDataset("duel", "play", _play(), "games of different players"))
+    found.append(NamedDataset("duel", "play", _play(), "games of different drivers"))
     return {dataset.name: dataset for dataset in found}
 
 
@@ -161,12 +161,13 @@ def find_dataset(name: str) -> NamedDataset:
     """Return a dataset by its name.
 
     Raises:
-        ValueError: There is none of that name.
+        ValueError: No dataset has this name.
     """
     known = datasets()
     if name not in known:
         near = ", ".join(get_close_matches(name, known, 3, 0.0))
         raise ValueError(
-            f"unknown dataset {name!r}; near it are {near}; airhockey data list has all"
+            f"unknown dataset {name!r}; similar names are {near}; airhockey data list "
+            "prints all names"
         )
     return known[name]

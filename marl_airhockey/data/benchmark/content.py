@@ -1,4 +1,4 @@
-"""Content of a dataset: its checksum, and what is published of it."""
+"""Checksum and statistics of a dataset, and their published values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.types import Array
 
 PUBLISHED = Path(__file__).parent / "published.json"
-"""File of the published contents, by name of the dataset"""
+"""File of the published contents, by name of the dataset."""
 
 
 class Content(NamedTuple):
@@ -24,19 +24,19 @@ class Content(NamedTuple):
     steps: int
     episodes: int
     success: float
-    """Fraction of the episodes that succeed; of a game, that the first seat wins"""
+    """Share of successful episodes; for a game, share that the first seat wins."""
     returns: float
-    """Mean return of an episode"""
+    """Mean return of an episode."""
     megabytes: float
     checksum: str
-    """SHA-256 of all columns"""
+    """SHA-256 of all columns."""
 
 
 def content_of(folder: Path) -> Content:
     """Return the content of a dataset.
 
     Raises:
-        ValueError: No recordings, or one that makes no sense; named.
+        ValueError: There are no recordings, or one is damaged.
     """
     files = recordings_in([folder])
     found = [summarize_recording(path) for path in files]
@@ -52,7 +52,7 @@ def content_of(folder: Path) -> Content:
 
 
 def checksum_of(files: list[Path]) -> str:
-    """Return the SHA-256 of seeds and columns of recordings, not of their files."""
+    """Return the SHA-256 of the seeds and columns of recordings, not of their files."""
     digest = hashlib.sha256()
     for path in files:
         for episode in episodes_of(path):
@@ -70,7 +70,7 @@ def _bytes(values: Array) -> bytes:
 
 @cache
 def published() -> dict[str, Content]:
-    """Return the published contents by name."""
+    """Return the published contents, by name of the dataset."""
     rows = json.loads(PUBLISHED.read_text())
     return {name: Content(**row) for name, row in rows.items()}
 
@@ -79,7 +79,7 @@ def reference_returns(scenario: str) -> tuple[float, float]:
     """Return the mean returns of the random and of the expert dataset of a task.
 
     Raises:
-        ValueError: A scenario without such datasets.
+        ValueError: The scenario has no such datasets.
     """
     known = references()
     if scenario not in known:
@@ -88,7 +88,7 @@ def reference_returns(scenario: str) -> tuple[float, float]:
 
 
 def references() -> dict[str, tuple[float, float]]:
-    """Return the mean returns of random and expert datasets by scenario."""
+    """Return the mean returns of the random and expert datasets, by scenario."""
     contents = published()
     return {
         name.split("/")[1]: (
@@ -101,14 +101,14 @@ def references() -> dict[str, tuple[float, float]]:
 
 
 def normalized_score(scenario: str, returns: float) -> float:
-    """Return the normalized score of a mean return: 0 is random, 100 the expert.
+    """Return the normalized score of a mean return: 0 for random, 100 for the expert.
 
     Args:
-        scenario: Task with the options of its datasets: the defaults.
+        scenario: Name of a task; its datasets have default options.
         returns: Mean return of an episode.
 
     Raises:
-        ValueError: A scenario without such datasets.
+        ValueError: The scenario has no such datasets.
     """
     low, high = reference_returns(scenario)
     return 100.0 * (returns - low) / (high - low)

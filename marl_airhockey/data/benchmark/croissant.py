@@ -1,4 +1,4 @@
-"""Card of a dataset: JSON-LD in the Croissant format 1.0 of MLCommons."""
+"""Card of a dataset, JSON-LD in the Croissant format 1.0 of MLCommons."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from marl_airhockey.data.reader import read_head
 from marl_airhockey.sim.core.recording import EPISODES, META, STEPS
 
 CARD = "croissant.json"
-"""Name of the file"""
+"""Name of the file of a card."""
 CONTEXT = {
     "@language": "en",
     "@vocab": "https://schema.org/",
@@ -54,12 +54,12 @@ CONTEXT = {
     "subField": "cr:subField",
     "transform": "cr:transform",
 }
-"""Terms of the format"""
+"""Terms of the format."""
 TYPES = {"b": "sc:Boolean", "i": "sc:Integer", "u": "sc:Integer", "f": "sc:Float"}
-"""Types by numpy's kind"""
+"""Types of the format, by the kind of the NumPy type."""
 PARQUET = "application/x-parquet"
 PUBLISHED_ON = "2026-11-25"
-"""Date of this version of the datasets"""
+"""Date of this version of the datasets."""
 
 
 def write_card(dataset: NamedDataset, folder: Path) -> Path:
@@ -98,15 +98,15 @@ def _description(dataset: NamedDataset) -> str:
     scale = (
         ""
         if known is None
-        else f"Mean return of random actions {known[0]}, of the expert {known[1]}. "
+        else f"Mean return: random actions {known[0]}, expert {known[1]}. "
     )
     players = ", ".join(
         " against ".join([part.player, *part.others.values()]) for part in dataset.parts
     )
     return (
         f"Air hockey, {dataset.scenario}, {dataset.tier}: {dataset.what}. Simulated. "
-        f"Players: {players}. {scale}A row is a control step; step 0 of an episode is "
-        "what was there before its first step."
+        f"Drivers: {players}. {scale}A row is a control step; step 0 of an episode is "
+        "the state before its first step."
     )
 
 
@@ -124,7 +124,7 @@ def _file(folder: Path, path: Path) -> dict[str, Any]:
 
 
 def _record_set(folder: Path, path: Path, head: dict[str, Any]) -> dict[str, Any]:
-    """Return the description of the steps in a file."""
+    """Return the description of the steps in a file, for a card."""
     file = path.relative_to(folder).as_posix()
     own = f"steps/{file}"
     columns = {
@@ -159,7 +159,7 @@ def _kind(dtype: str) -> str:
 
 
 def _column(column: dict[str, Any]) -> str:
-    """Return the description of a column: shape, unit and frame."""
+    """Return the description of a column with its shape, unit and frame."""
     parts = [f"shape {tuple(column['shape'])}"]
     parts += [f"{key} {column[key]}" for key in ("unit", "frame") if column.get(key)]
     return ", ".join(parts)

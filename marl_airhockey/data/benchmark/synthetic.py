@@ -1,7 +1,7 @@
-"""Synthetic human: a policy's intent, carried out late, noisily and inconsistently.
+"""Synthetic human: a policy whose actions get latency, noise and inconsistency.
 
-It is a script and no model of a person: it makes data with these three properties of
-demonstrations, in known amounts.
+It is a script, not a model of a person. Its data have these three properties of
+demonstrations in known amounts.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from marl_airhockey.sim.core.seat import Seat
 from marl_airhockey.types import Array
 
 LATENCY = (0.05, 0.2)
-"""Range of the time from intent to action, s; sampled for each episode"""
+"""Range of the latency of actions, s; sampled for each episode."""
 SPEED = (0.7, 1.0)
-"""Range of the factor of all actions; sampled for each episode"""
+"""Range of the factor of all actions; sampled for each episode."""
 TREMOR = (0.05, 0.2)
-"""Range of the standard deviation of slow noise; sampled for each episode"""
+"""Range of the standard deviation of slow noise; sampled for each episode."""
 TREMOR_TIME = 0.25
-"""Time constant of that noise, s"""
+"""Time constant of the slow noise, s."""
 SCATTER = 0.2
-"""Standard deviation of noise in proportion to the action"""
+"""Standard deviation of the noise that is proportional to the action."""
 BIAS = 0.05
-"""Standard deviation of a constant error; sampled for each episode"""
+"""Standard deviation of a constant error; sampled for each episode."""
 LAPSE_RATE, LAPSE_TIME = 0.1, 0.4
-"""Rate, 1/s, and length, s, of lapses in which nothing is done"""
+"""Rate, 1/s, and length, s, of lapses, in which the action is 0."""
 LONGEST = 64
-"""Number of actions that are remembered at most"""
+"""Largest number of actions in the memory."""
 OWN = "synthetic."
-"""Beginning of the names of its memory"""
+"""Prefix of the names in the memory."""
 
 
 class SyntheticHuman(Driver):
-    """Driver with the intent of a policy and the errors of a hand.
+    """Driver that adds errors to the actions of a policy.
 
     Args:
-        policy: Driver whose actions it intends.
+        policy: Driver whose actions are changed.
     """
 
     def __init__(self, policy: Driver) -> None:

@@ -1,1 +1,1 @@
-"""Datasets of other libraries: recordings written as theirs, and theirs read."""
+"""Export of recordings to datasets of other libraries, and import from them."""

@@ -21,7 +21,7 @@ from marl_airhockey.sim.core.errors import unknown_name
 
 
 class Export(Protocol):
-    """Function that writes recordings as a dataset, and returns its path."""
+    """Function that writes recordings as a dataset and returns its path."""
 
     def __call__(
         self, files: Sequence[Path], name: str, root: Path | None, seat: int | None
@@ -34,13 +34,13 @@ class Format:
 
     export: Export
     read: Callable[[ImportSettings], Path]
-    """Import: writes a recording and returns its path"""
+    """Function that writes a dataset as a recording and returns its path."""
     fits: Callable[[Path], bool]
-    """Whether a source looks like a dataset of the format"""
+    """Function that returns True if a source looks like a dataset of the format."""
 
 
 def _any(path: Path, suffixes: tuple[str, ...]) -> bool:
-    """Return whether a path has one of some suffixes, or a file in it has."""
+    """Return True if a file, or any file in a folder, has one of some suffixes."""
     files = path.iterdir() if path.is_dir() else [path]
     return any(file.suffix in suffixes for file in files)
 
@@ -57,17 +57,17 @@ FORMATS = {
     "rows": Format(
         export_rows, import_rows, lambda path: path.exists() and _any(path, (".csv",))
     ),
-    # Last, as a Minari dataset is named and not a path.
+    # Minari is the last format, because a Minari dataset is a name and not a path.
     "minari": Format(export_minari, import_minari, lambda path: True),
 }
-"""Formats by name, in the order in which an import looks for the one that fits"""
+"""Formats by name, in the order in which an import tries them."""
 
 
 def find_format(name: str) -> Format:
-    """Return a format.
+    """Return a format by its name.
 
     Raises:
-        ValueError: There is none of that name.
+        ValueError: No format has this name.
     """
     if name not in FORMATS:
         raise ValueError(unknown_name("format", name, FORMATS))
@@ -78,13 +78,13 @@ def import_dataset(settings: ImportSettings) -> Path:
     """Write a dataset of another library as a recording; return its path.
 
     Raises:
-        ValueError: It cannot be read, or does not fit the scenario; named.
+        ValueError: The dataset cannot be read, or does not fit the scenario.
     """
     source = Path(settings.source)
     fitting = [name for name, each in FORMATS.items() if each.fits(source)]
     if fitting == ["minari"] and source.exists():
         raise ValueError(
-            f"{source}: no LeRobot dataset ({INFO}), no HDF5 and no CSV file; a Minari "
-            "dataset is given by its name"
+            f"{source}: this is not a LeRobot dataset (no {INFO}), an HDF5 file or a "
+            "CSV file; give a Minari dataset by its name"
         )
     return FORMATS[fitting[0]].read(settings)

@@ -1,9 +1,9 @@
-"""LeRobotDataset v3.0: recordings as its files.
+"""Export of recordings as LeRobotDataset v3.0.
 
-A frame holds what was there before a step, the action, and its result (`next.*`). The
+A frame contains the values before a step, the action, and its result (`next.*`). The
 observation after the last step of an episode is a column of the table of episodes,
-`final/NAME`, which LeRobot ignores. The film of a real table becomes a video, of which
-each frame shows the newest picture at the beginning of its step.
+`final/NAME`, which LeRobot ignores. The video of a real table has one image per step:
+the newest camera frame at the start of the step.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from marl_airhockey.sim.core.recording import FILM, Columns, Episode
 from marl_airhockey.types import Array
 
 STATE = ("position", "velocity", "angle", "spin")
-"""Fields of the true state that are the `observation.environment_state`"""
+"""Fields of the true state that form `observation.environment_state`."""
 OBSERVATION, ACTION = "observation.state", "action"
 
 
@@ -44,23 +44,24 @@ def export_lerobot(
     """Write recordings as a LeRobot dataset; return its folder.
 
     Args:
-        files: Recordings of one kind.
+        files: Recordings of the same environment.
         name: Name of the dataset.
         root: Folder of all datasets; None for ``datasets``.
-        seat: Index of the seat whose steps are taken.
+        seat: Index of the seat whose steps are written.
 
     Raises:
-        ValueError: A dataset that exists, no seat, a rate that is not whole,
-            recordings that differ, or without steps.
+        ValueError: The dataset exists, no seat is given, the rate is not a whole
+            number, or recordings have different environments or no steps.
     """
     require("pandas", "data")
     if seat is None:
-        raise ValueError("--seat: a LeRobot dataset has the steps of one; name it")
+        raise ValueError("--seat -1: a LeRobot dataset is of one seat; give its index")
     head = shared_head(files)
     rate = 1.0 / head["control_dt"]
     if abs(rate - round(rate)) > 1e-6:
         raise ValueError(
-            f"control_dt {head['control_dt']}: LeRobot takes whole frames per second"
+            f"control_dt {head['control_dt']}: LeRobot needs a whole number of frames "
+            "per second"
         )
     final = named_folder(root, name)
     films = {path: path / FILM for path in files if (path / FILM).exists()}
@@ -76,7 +77,7 @@ def export_lerobot(
             frames, last = _frames(path, episode, seat)
             writer.add(frames, last, _task(head), *_film(path, episode))
         if not writer.episodes:
-            raise ValueError(f"{files[0]}: the film ends before every episode")
+            raise ValueError(f"{files[0]}: the video ends before every episode")
         ours = {**playable(head), "scenario": head["scenario"], "seat": seat}
         writer.close({**ours, "backend": head["backend"]})
     return final
@@ -87,7 +88,7 @@ def _task(head: Mapping[str, Any]) -> str:
 
 
 def _names(head: Mapping[str, Any], seat: int) -> dict[str, list[str]]:
-    """Return the names of the numbers of features."""
+    """Return the names of the elements of each feature."""
     names = {ACTION: ["x", "y"], "applied_action": ["x", "y"]}
     if "goals" not in head:
         env = parallel_env(head["scenario"], **playable(head))
@@ -98,7 +99,7 @@ def _names(head: Mapping[str, Any], seat: int) -> dict[str, list[str]]:
 
 
 def _frames(path: Path, episode: Episode, seat: int) -> tuple[Columns, Columns]:
-    """Return the features (T, ...) of an episode, and its last observation."""
+    """Return the features (T, ...) of an episode and its last observation."""
     columns, shown = episode.columns, {}
     for part, values in observations_of(path, episode).items():
         name = OBSERVATION if part in ("", "observation") else f"observation.{part}"
@@ -132,7 +133,7 @@ def _frames(path: Path, episode: Episode, seat: int) -> tuple[Columns, Columns]:
 
 
 def _film(path: Path, episode: Episode) -> tuple[Path, Array] | tuple[()]:
-    """Return the film of an episode and its frame (T,) for each step, if it has one."""
+    """Return the video of an episode and the number of its frame for each step (T,)."""
     if "frame" not in episode.columns or not (path / FILM).exists():
         return ()
     shown = np.concatenate([episode.first["frame"][None], episode.columns["frame"]])

@@ -1,4 +1,4 @@
-"""LeRobotDataset v3.0: its files as recordings."""
+"""Import of LeRobotDataset v3.0 as recordings."""
 
 from __future__ import annotations
 
@@ -26,29 +26,30 @@ from marl_airhockey.sim.core.recording import PLAYED, Columns
 from marl_airhockey.types import Array
 
 NEEDED = (OBSERVATION, ACTION, "next.reward", "next.done")
-"""Features without which a dataset cannot be learned from"""
+"""Features that a dataset must have for learning."""
 INDICES = ("episode_index", "frame_index")
 OPTIONAL = (
     *("observation.achieved_goal", "observation.desired_goal"),
     *("next.success", "next.terminated", "next.truncated"),
 )
-"""Further features that are read where they are; without `next.success`, none is"""
+"""Optional features. Without `next.success` no step is a success."""
 
 
 def import_lerobot(settings: ImportSettings) -> Path:
     """Write a LeRobot dataset v3.0 of one seat as a recording; return its path.
 
-    Where there is no observation after an episode's last step, that before it is taken.
+    If the observation after the last step of an episode is missing, the observation
+    before this step is used.
 
     Raises:
-        ValueError: Another version, a feature that is missing, or one whose shape is
-            not that of the scenario.
+        ValueError: The dataset has another version, or a feature is missing or differs
+            in shape from that of the scenario.
     """
     folder = Path(settings.source)
     info = _json(folder / INFO)
     if info.get("codebase_version") != CODE:
         raise ValueError(
-            f"{folder}: version {info.get('codebase_version')!r}, expected {CODE!r}"
+            f"{folder}: version {info.get('codebase_version')!r}; expected {CODE!r}"
         )
     features = info.get("features", {})
     for name in NEEDED:
@@ -57,7 +58,7 @@ def import_lerobot(settings: ImportSettings) -> Path:
     known = _json(folder / OURS) if (folder / OURS).exists() else {}
     rate = info.get("fps")
     if not (isinstance(rate, (int, float)) and rate > 0):
-        raise ValueError(f"{folder / INFO}: fps {rate!r} is no rate")
+        raise ValueError(f"{folder / INFO}: fps {rate!r}; expected a rate above 0")
     known.setdefault("control_dt", 1.0 / rate)
     head = settings.head("lerobot", known)
     parts = _parts(features)
@@ -86,7 +87,7 @@ def _json(file: Path) -> dict[str, Any]:
     """Return the contents of a JSON file.
 
     Raises:
-        ValueError: It cannot be read; names the file.
+        ValueError: The file cannot be read.
     """
     try:
         content = json.loads(file.read_text())
@@ -98,7 +99,7 @@ def _json(file: Path) -> dict[str, Any]:
 
 
 def _parts(features: Mapping[str, Any]) -> dict[str, str]:
-    """Return the columns of observations by the features that they are made of."""
+    """Return the name of the column of observations for each feature."""
     goals = [f"observation.{name}" for name in ("achieved_goal", "desired_goal")]
     if all(name in features for name in goals):
         return {OBSERVATION: "observation.observation", **{n: n for n in goals}}
@@ -108,7 +109,7 @@ def _parts(features: Mapping[str, Any]) -> dict[str, str]:
 def _episode_rows(
     folder: Path, parts: Mapping[str, str]
 ) -> tuple[dict[int, int], dict[int, dict[str, Array]]]:
-    """Return lengths of episodes, and their last observations by feature.
+    """Return lengths and last observations, by feature, of all episodes.
 
     Raises:
         ValueError: There is no table of episodes.
@@ -125,7 +126,7 @@ def _episode_rows(
                 if value is not None
             }
     if not lengths:
-        raise ValueError(f"{folder / EPISODES}: there is no table of episodes in it")
+        raise ValueError(f"{folder / EPISODES}: it contains no table of episodes")
     return lengths, found
 
 
@@ -137,7 +138,7 @@ def _episodes(folder: Path) -> Iterator[tuple[int, Columns]]:
     """
     files = sorted((folder / DATA).rglob("*.parquet"))
     if not files:
-        raise ValueError(f"{folder / DATA}: there are no files *.parquet in it")
+        raise ValueError(f"{folder / DATA}: it contains no *.parquet files")
     for file in files:
         table = read_table(file)
         for name in (*NEEDED, *INDICES):
@@ -161,7 +162,7 @@ def _numbers(file: Path, name: str, values: list[Any]) -> Array:
     """Return a column as an array.
 
     Raises:
-        ValueError: It holds no numbers, or lists of different lengths; named.
+        ValueError: A value is not a number, or lists have different lengths.
     """
     try:
         return np.array(values, np.float64)
@@ -172,7 +173,7 @@ def _numbers(file: Path, name: str, values: list[Any]) -> Array:
 def _columns(
     frames: Columns, parts: Mapping[str, str], last: Mapping[str, Array]
 ) -> tuple[Columns, Columns]:
-    """Return the columns before the first step, and those (T, ...) after each."""
+    """Return the values before the first step, and the columns (T, ...) after steps."""
     first, after = {}, {}
     for name, column in parts.items():
         shown = frames[name].astype(np.float32)

@@ -18,21 +18,21 @@ from marl_airhockey.sim.render.mp4 import Mp4Writer
 from marl_airhockey.types import Array
 
 CODE = "v3.0"
-"""Version of the format"""
+"""Version of the format."""
 INFO, STATS, TASKS = "meta/info.json", "meta/stats.json", "meta/tasks.parquet"
 EPISODES, DATA, OURS = "meta/episodes", "data", "meta/marl_airhockey.json"
 CHUNK = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 CAMERA = "observation.images.table"
-"""Feature of the table's camera"""
+"""Feature of the table's camera."""
 FINAL = "final/"
-"""Beginning of the names of columns of episodes that hold a last observation"""
+"""Prefix of the columns of episodes that contain a last observation."""
 FILES, DATA_MB, VIDEO_MB = 1000, 100, 200
-"""Files in a chunk, and sizes beyond which a new file begins, MB"""
+"""Number of files in a chunk, and sizes above which a new file is started, MB."""
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 KEYS = ("frame_index", "episode_index", "index", "task_index")
-"""Integer features of all datasets"""
+"""Integer features of all datasets."""
 SAMPLED = 20
-"""Pictures of an episode from which the statistics of its video are computed"""
+"""Number of images per episode for the statistics of its video."""
 Stats = dict[str, list[Any]]
 
 
@@ -41,8 +41,8 @@ class LeRobotWriter:
 
     Args:
         folder: Empty folder of the dataset.
-        rate: Frames per second.
-        names: Names of the numbers of features.
+        rate: Frame rate, frames/s.
+        names: Names of the elements of each feature.
     """
 
     def __init__(self, folder: Path, rate: int, names: dict[str, list[str]]) -> None:
@@ -72,10 +72,10 @@ class LeRobotWriter:
 
         Args:
             frames: Features (T, ...) by name.
-            last: Observations after the last step.
+            last: Observations after the last step, by name.
             task: Description of the task.
-            film: Film of the recording, if there is one.
-            pictures: (T,) number of the film's picture for each step.
+            film: Video of the recording; None for no video.
+            pictures: Number of the frame of the video for each step (T,).
         """
         count, number = len(next(iter(frames.values()))), len(self._rows)
         if task not in self._tasks:
@@ -118,7 +118,7 @@ class LeRobotWriter:
         self._frames += count
 
     def _write_frames(self, frames: Columns) -> None:
-        """Write an episode as a row group; a file that is full is closed."""
+        """Write an episode as a row group; close the file if it is full."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -146,14 +146,14 @@ class LeRobotWriter:
         return {"dtype": str(dtype), "shape": [size], "names": self._names.get(name)}
 
     def _path(self, part: str, number: int, suffix: str) -> Path:
-        """Return the path of a file with a number; its folder is made."""
+        """Return the path of a file with a number; create its folder."""
         where = CHUNK.format(chunk_index=number // FILES, file_index=number % FILES)
         path = self._folder / part / f"{where}.{suffix}"
         path.parent.mkdir(parents=True, exist_ok=True)
         return path
 
     def _add_video(self, number: int, film: Path, pictures: Array) -> Stats:
-        """Write the video of an episode; return the statistics of its pictures."""
+        """Write the video of an episode; return the statistics of its images."""
         if self._film is None or self._film.path != film:
             self._film = FilmFrames(film)
         path = self._path(f"videos/{CAMERA}", number, "mp4")
@@ -169,7 +169,7 @@ class LeRobotWriter:
                 kept.append(image[::4, ::4, ::-1].reshape(-1, 3) / 255.0)
         writer.close()
         found = _stats(np.concatenate(kept))
-        # As images: channels first, one value for all pixels.
+        # Statistics of images have the channels first and one value for all pixels.
         lists = {n: [[[x]] for x in v] for n, v in found.items() if n != "count"}
         return {**lists, "count": [len(pictures)]}
 
@@ -177,7 +177,7 @@ class LeRobotWriter:
         """Write tables of episodes and tasks, statistics and `info.json`.
 
         Args:
-            ours: Contents of a further file, by which the import knows the scenario.
+            ours: Contents of a further file, from which an import reads the scenario.
         """
         import pandas as pd
         import pyarrow as pa
@@ -229,7 +229,7 @@ def _of_camera(column: str) -> bool:
 
 
 def _stats(values: Array) -> Stats:
-    """Return the statistics of the numbers (T, ...) of a feature."""
+    """Return the statistics of the values (T, ...) of a feature."""
     flat = np.asarray(values, np.float64).reshape(len(values), -1)
     found = {
         "min": flat.min(0),
@@ -242,7 +242,7 @@ def _stats(values: Array) -> Stats:
 
 
 def _joined(rows: list[Stats]) -> Stats:
-    """Return the statistics of all videos; quantiles are means over the episodes."""
+    """Return the statistics of all videos; quantiles are means over episodes."""
     count = np.array([row["count"][0] for row in rows], np.float64)
     share = (count / count.sum())[:, None, None, None]
     each = {n: np.array([row[n] for row in rows]) for n in rows[0] if n != "count"}
@@ -255,7 +255,7 @@ def _joined(rows: list[Stats]) -> Stats:
 
 
 def _video(height: int, width: int, rate: int) -> dict[str, Any]:
-    """Return the description of a video."""
+    """Return the description of the feature of a video."""
     return {
         "dtype": "video",
         "shape": [height, width, 3],

@@ -1,4 +1,4 @@
-"""Recordings made of measured positions of a puck and a paddle."""
+"""Recordings of measured positions of a puck and a paddle."""
 
 from __future__ import annotations
 
@@ -21,48 +21,49 @@ from marl_airhockey.sim.core.state import RESULTS, Kind
 from marl_airhockey.types import Array
 
 BEYOND = 0.1
-"""Largest distance of a measured body beyond the table's edge, m"""
+"""Largest distance of a measured body beyond the table's edge, m."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Measured episode of T + 1 rows, table frame."""
+    """Measured episode of T + 1 rows."""
 
     time: Array
-    """(T + 1,) times, s"""
+    """Times (T + 1,), s."""
     puck: Array | None
-    """(T + 1, 2) positions, m; nan where the puck was not seen; None if it was not
-    measured at all: it is then at the far end of the table"""
+    """Positions of the puck (T + 1, 2), table frame, m; nan where it was not detected.
+    None for a puck that was not measured and stays at the far end of the table."""
     paddle: Array
-    """(T + 1, 2) positions, m"""
+    """Positions of the paddle (T + 1, 2), table frame, m."""
     paddle_velocity: Array | None = None
-    """(T + 1, 2) velocities, m/s; None to differentiate the positions"""
+    """Velocities of the paddle (T + 1, 2), table frame, m/s; None to differentiate the
+    positions."""
     action: Array | None = None
-    """(T, 2) requested actions, fractions of top speed, ego frame; None to take those
-    that lead to the velocities"""
+    """Requested actions (T, 2), fractions of the top speed, ego frame; None to compute
+    them from the velocities."""
 
 
 def scenario_for(settings: ImportSettings) -> Scenario:
     """Return the scenario of an import.
 
     Raises:
-        ValueError: It has other bodies than one paddle and one puck.
+        ValueError: The scenario has other bodies than one paddle and one puck.
     """
     scenario = make_scenario(settings.scenario, **settings.options)
     bodies = scenario.scene.bodies
     if bodies.kind != (Kind.PADDLE, Kind.PUCK):
         raise ValueError(
-            f"{scenario.name}: measured are one paddle and one puck, and it has other "
-            "bodies; import as juggle or touch, say"
+            f"{scenario.name}: expected a scenario with one paddle and one puck, for "
+            "example juggle or touch"
         )
     return scenario
 
 
 def recorded_scenario(path: pathlib.Path, head: dict[str, Any]) -> Scenario:
-    """Return the scenario of a recording that has a puck.
+    """Return the scenario of a recording, which must have a puck.
 
     Raises:
-        ValueError: It has none; named.
+        ValueError: The scenario has no puck.
     """
     scenario = scenario_of(Recording(path, head, []))
     if not scenario.scene.bodies.pucks:
@@ -71,7 +72,7 @@ def recorded_scenario(path: pathlib.Path, head: dict[str, Any]) -> Scenario:
 
 
 def measured_head(settings: ImportSettings, control_dt: float) -> dict[str, object]:
-    """Return the head of a recording of measured episodes."""
+    """Return the metadata of a recording of measured episodes."""
     scenario = scenario_for(settings)
     known = {"control_dt": control_dt, "backend": REAL}
     cycles = round(scenario.seconds / control_dt)
@@ -87,19 +88,20 @@ def write_measured(
 ) -> None:
     """Write a measured episode.
 
-    Positions of a puck that was not seen are interpolated, and marked as not visible.
-    Velocities and contacts follow from the positions, see `measured_events`.
+    Positions of a puck that was not detected are interpolated and marked as not
+    visible. Velocities and contacts are computed from the positions, see
+    `measured_events`.
 
     Args:
         writer: Writer of the recording.
         scenario: Scenario with one paddle and one puck.
-        found: Episode.
+        found: Measured episode.
         more: Further columns (T + 1, ...).
-        reason: Reason of its end.
+        reason: Reason for the end of the episode.
 
     Raises:
-        ValueError: Fewer than two rows, times that do not grow, or a puck that is
-            never seen.
+        ValueError: There are fewer than two rows, times do not increase, a body is off
+            the table, or the puck is never detected.
     """
     rows = len(found.time)
     if rows < 2:
@@ -108,7 +110,7 @@ def write_measured(
     if (steps <= 0).any():
         k = int(np.argmax(steps <= 0))
         raise ValueError(
-            f"times must grow, and {found.time[k + 1]} s follows {found.time[k]} s"
+            f"times must increase, but {found.time[k + 1]} s follows {found.time[k]} s"
         )
     puck, seen = _puck(scenario, found)
     half = scenario.scene.table.size / 2 + BEYOND
@@ -117,8 +119,8 @@ def write_measured(
             row = int(np.argmax((np.abs(position) > half).any(1)))
             raise ValueError(
                 f"row {row}: the {name} at {position[row].round(3).tolist()} m is off "
-                f"the table {scenario.table!r}: --option table=..., metres, its centre "
-                "as origin"
+                f"the table {scenario.table!r}; expected metres from the centre of the "
+                "table, which --option table=... selects"
             )
     columns = _state_columns(scenario, found, puck, seen)
     action = found.action
@@ -152,19 +154,19 @@ def action_of(scenario: Scenario, velocity: Array) -> Array:
 
 
 def _puck(scenario: Scenario, found: Measured) -> tuple[Array, Array]:
-    """Return positions (T + 1, 2) of the puck, and where it was seen (T + 1,)."""
+    """Return positions of the puck (T + 1, 2), and True where it was detected."""
     rows = len(found.time)
     if found.puck is None:
         far = scenario.scene.table.size[0] / 2 - scenario.scene.table.puck_radius
         return np.tile([far, 0.0], (rows, 1)), np.zeros(rows, bool)
     seen = np.asarray(np.isfinite(found.puck).all(1))
     if not seen.any():
-        raise ValueError("the puck is never seen")
+        raise ValueError("the puck is never detected")
     return interpolated(found.time, found.puck, seen), seen
 
 
 def interpolated(time: Array, position: Array, seen: Array) -> Array:
-    """Return positions (T, 2), linear in time where a body was not seen."""
+    """Return positions (T, 2), interpolated in time where a body was not detected."""
     known = time[seen], position[seen]
     return np.stack([np.interp(time, known[0], known[1][:, k]) for k in range(2)], 1)
 
@@ -172,7 +174,7 @@ def interpolated(time: Array, position: Array, seen: Array) -> Array:
 def _state_columns(
     scenario: Scenario, found: Measured, puck: Array, seen: Array
 ) -> Columns:
-    """Return the columns (T + 1, ...) of states and of what was seen."""
+    """Return the columns (T + 1, ...) of states and of detections."""
     rows, time = len(found.time), found.time - found.time[0]
     states = scenario.scene.still_state(rows)
     moving = found.paddle_velocity
@@ -196,7 +198,7 @@ def _state_columns(
 
 
 def _physics(scenario: Scenario) -> dict[str, float]:
-    """Return nominal physical parameters: those of the table are not known."""
+    """Return nominal physics parameters; those of the table are unknown."""
     physics = Physics(scenario.scene.defaults, arms=True, real=True)
     streams = RandomStreams.keyed(np.zeros(1, np.uint64), np.zeros(1, int), "physics")
     values = physics.draw(streams)

@@ -1,4 +1,4 @@
-"""Velocities and contacts of a puck, from its measured positions alone."""
+"""Velocities and contacts of a puck, computed from its measured positions."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from marl_airhockey.types import Array
 
 
 class Path(NamedTuple):
-    """Path of a body at T + 1 times, table frame."""
+    """Trajectory of a body at T + 1 times."""
 
     time: Array
-    """(T + 1,) s"""
+    """Times (T + 1,), s."""
     position: Array
-    """(T + 1, 2) m"""
+    """Positions (T + 1, 2), table frame, m."""
 
 
 def fill_events(state: State, scene: Scene, puck: Path, paddle: Path) -> None:
-    """Fill contacts, bounces and goal lines of one puck, and its velocity.
+    """Compute contacts, wall bounces, crossed goal lines and velocity of one puck.
 
-    Velocities are central differences of the positions, and one-sided ones next to a
-    contact or a bounce.
+    Velocities are central differences of the positions. Next to a contact or a bounce
+    they are one-sided differences.
 
     Args:
         state: States (T + 1, ...) of one paddle and one puck, changed in place.
-        scene: Table, sizes and goal lines.
-        puck: Times and positions at which the puck was seen.
-        paddle: All T + 1 times and positions of the paddle.
+        scene: Scene with the table, the sizes of bodies and the goal lines.
+        puck: Trajectory of the puck at the times when it was detected.
+        paddle: Trajectory of the paddle at all T + 1 times.
     """
     rows = np.searchsorted(paddle.time, puck.time)
     before, after = _one_sided(puck)
@@ -61,7 +61,7 @@ def fill_events(state: State, scene: Scene, puck: Path, paddle: Path) -> None:
 
 
 def _one_sided(path: Path) -> tuple[Array, Array]:
-    """Return the velocities (T, 2) from the time before, and to the time after."""
+    """Return velocities (T, 2) since the previous time, and until the next time."""
     if len(path.time) < 2:
         return np.zeros_like(path.position), np.zeros_like(path.position)
     steps = np.diff(path.position, axis=0) / np.diff(path.time)[:, None]

@@ -1,7 +1,7 @@
-"""Minari: recordings as its datasets, and its datasets as recordings.
+"""Export of recordings as Minari datasets, and import of Minari datasets.
 
-A dataset holds the steps of one seat, as offline learners want them; that of a whole
-game has a dict of agents for observations and actions.
+A dataset contains the steps of one seat, as offline learners need them. A dataset of
+all seats has observations and actions as dictionaries by agent.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ if TYPE_CHECKING:
     from minari.data_collector import EpisodeBuffer
 
 NAME = re.compile(r"^(\w[-\w]*\w/)*[-\w]+-v\d+$")
-"""Form of a dataset's name, as airhockey/juggle/expert-v0"""
+"""Pattern of a dataset's name, for example airhockey/juggle/expert-v0."""
 STATE = ("position", "velocity", "angle", "spin")
-"""Fields of the true state that are kept in the infos"""
+"""Fields of the true state in the infos."""
 ROOT = "MINARI_DATASETS_PATH"
-"""Environment variable by which Minari finds its datasets"""
+"""Environment variable with the folder of Minari's datasets."""
 
 
 def export_minari(
@@ -58,26 +58,28 @@ def export_minari(
 ) -> Path:
     """Write recordings as a Minari dataset; return its folder.
 
-    The folder is there when it is complete, and not before.
+    The folder exists only when it is complete.
 
     Args:
-        files: Recordings of one kind.
-        name: Name of the dataset, as airhockey/juggle/expert-v0.
-        root: Folder of all datasets; None for Minari's own.
-        seat: Index of the seat whose steps are taken; None for all, by agent.
+        files: Recordings of the same environment.
+        name: Name of the dataset, for example airhockey/juggle/expert-v0.
+        root: Folder of all datasets; None for Minari's own folder.
+        seat: Index of the seat whose steps are written; None for all seats, by agent.
 
     Raises:
-        ValueError: A name that Minari does not take, a dataset that exists, recordings
-            that differ, or without steps.
+        ValueError: The name is not valid for Minari, the dataset exists, or recordings
+            have different environments or no steps.
     """
     require("minari", "offline")
     if not NAME.match(name):
-        raise ValueError(f"--name {name!r}: expected it as in airhockey/juggle/test-v0")
+        raise ValueError(
+            f"--name {name!r}: expected a name such as airhockey/juggle/test-v0"
+        )
     root = root or Path(os.environ.get(ROOT, Path.home() / ".minari" / "datasets"))
-    root = root.resolve()  # Minari would look for a relative one in itself.
+    root = root.resolve()  # Minari resolves relative paths in its own folder.
     final = root / name
     if final.exists():
-        raise ValueError(f"{final}: there is such a dataset; take a new version")
+        raise ValueError(f"{final}: this dataset exists; give a new version")
     head = shared_head(files)
     buffers = [
         _buffer(k, path, episode, seat)
@@ -94,7 +96,7 @@ def export_minari(
 
 @contextlib.contextmanager
 def _at(root: Path) -> Iterator[None]:
-    """Let Minari find its datasets in a folder."""
+    """Set the folder of Minari's datasets in this context."""
     before = os.environ.get(ROOT)
     os.environ[ROOT] = str(root)
     try:
@@ -116,7 +118,7 @@ def _write(
     version = metadata.version("marl_airhockey")
     low, high = _references(head)
     with warnings.catch_warnings():
-        # It warns of each field that is left out: here, who to write to.
+        # Minari warns about missing fields; here, the author's e-mail is missing.
         warnings.simplefilter("ignore")
         minari.create_dataset_from_buffers(
             name,
@@ -136,7 +138,7 @@ def _write(
 
 
 def _references(head: Mapping[str, Any]) -> tuple[float | None, float | None]:
-    """Return the mean returns of random actions and of the expert, where known."""
+    """Return the mean returns of random actions and of the expert, if known."""
     usual = not head["options"] and head["profile"] == PROFILE
     return references().get(head["scenario"], (None, None)) if usual else (None, None)
 
@@ -145,18 +147,18 @@ def _description(head: Mapping[str, Any], seat: int | None) -> str:
     whose = "all seats, by agent" if seat is None else f"seat {seat}"
     return (
         f"Air hockey, {head['scenario']}, {whose}: recorded on {head.get('backend')} "
-        f"in the {head.get('profile')} profile, {1.0 / head['control_dt']:.0f} steps a "
-        f"second. Infos hold the true state, applied actions and success."
+        f"in the {head.get('profile')} profile, {1.0 / head['control_dt']:.0f} steps "
+        f"per second. Infos contain the true state, applied actions and success."
     )
 
 
 def _env_spec(head: Mapping[str, Any], seat: int | None) -> Any:
-    """Return the gymnasium spec of a single-seat scenario; None for games."""
+    """Return the Gymnasium spec of a scenario of one seat; None for games."""
     if seat is None or len(head.get("players", [])) != 1:
         return None
     try:
         spec = gymnasium.spec(gymnasium_id(head["scenario"]))
-    except ValueError:  # A scenario of somebody's own.
+    except ValueError:  # Scenarios of users have no id.
         return None
     return gymnasium.make(spec, **playable(head)).unwrapped.spec
 
@@ -164,7 +166,7 @@ def _env_spec(head: Mapping[str, Any], seat: int | None) -> Any:
 def _buffer(
     number: int, path: Path, episode: Episode, seat: int | None
 ) -> EpisodeBuffer:
-    """Return an episode as Minari takes it."""
+    """Return an episode in the form of Minari."""
     from minari.data_collector import EpisodeBuffer
 
     columns = episode.columns
@@ -202,7 +204,7 @@ def _single(values: Array) -> Array:
 
 
 def _infos(episode: Episode, seat: int | None) -> dict[str, Any]:
-    """Return the infos (T + 1, ...), those of the reset first."""
+    """Return the infos (T + 1, ...), which start with those of the reset."""
     found: dict[str, Any] = {"state": {}}
     for name in STATE:
         column = f"state.{name}"
@@ -222,7 +224,7 @@ def import_minari(settings: ImportSettings) -> Path:
     """Write a Minari dataset of one seat as a recording; return its path.
 
     Raises:
-        ValueError: There is no such dataset, or its spaces are not those of the
+        ValueError: The dataset does not exist, or its spaces differ from those of the
             scenario.
     """
     require("minari", "offline")
@@ -233,12 +235,12 @@ def import_minari(settings: ImportSettings) -> Path:
         try:
             dataset = minari.load_dataset(name)
         except FileNotFoundError as error:
-            raise ValueError(f"{name}: there is no such Minari dataset") from error
+            raise ValueError(f"{name}: this Minari dataset does not exist") from error
         except (OSError, ValueError, KeyError) as error:
             raise ValueError(f"{name}: Minari cannot read it: {error}") from error
         if "paddle_0" in getattr(dataset.observation_space, "spaces", {}):
             raise ValueError(
-                f"{name}: it has several agents; export one of them with --seat"
+                f"{name}: it has several agents; export one agent with --seat"
             )
         spec = dataset.env_spec
         head = settings.head("minari", dict(spec.kwargs) if spec is not None else {})
@@ -263,7 +265,7 @@ def _import_episode(writer: RecordingWriter, episode: Any) -> None:
     success = np.asarray(infos.get("success", np.zeros(len(reward) + 1)), bool)
     for values in (*seen.values(), reward):
         if not np.isfinite(values).all():
-            raise ValueError(f"episode {episode.id}: numbers are missing in it")
+            raise ValueError(f"episode {episode.id}: some numbers are not finite")
     writer.begin({n: v[0] for n, v in seen.items()}, int(episode.id))
     writer.add_rows(
         {

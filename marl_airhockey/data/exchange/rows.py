@@ -1,7 +1,8 @@
-"""Rows `t,x,y[,paddle_x,paddle_y]` of real tables: CSV files, one for each episode.
+"""CSV files of real tables with the rows `t,x,y[,paddle_x,paddle_y]`.
 
-Times are in s and positions in m, in the table frame; a cell is empty where puck or
-paddle was not seen. `airhockey fit-table` reads such files, too.
+There is one file for each episode. Times are in s and positions in m, in the table
+frame. A cell is empty if the body was not detected. `airhockey fit-table` also reads
+such files.
 """
 
 from __future__ import annotations
@@ -33,31 +34,33 @@ from marl_airhockey.sim.core.recording import PLAYED, Columns, Episode
 from marl_airhockey.types import Array
 
 PUCK, PADDLE = ("t", "x", "y"), ("paddle_x", "paddle_y")
-"""Names of the columns of a file; those of the paddle may be missing"""
+"""Names of the columns of a file; the columns of the paddle are optional."""
 MOMENT = "device.moment"
-"""Column of the measured times, s"""
+"""Column of the measured times, s."""
 SEEN = "paddle_visible"
-"""Column that is true where the paddle was seen"""
+"""Column that is true where the paddle was detected."""
 
 
 def import_rows(settings: ImportSettings) -> Path:
-    """Write CSV files of positions as a recording, an episode a file; return its path.
+    """Write CSV files of positions, one per episode, as a recording; return its path.
 
-    Positions between those that were seen are interpolated. Without columns of a
-    paddle, it is at the centre of its reach.
+    Missing positions are interpolated. A paddle without columns is at the centre of its
+    workspace.
 
     Raises:
-        ValueError: No such files, a missing column, or a cell that is no number; named.
+        ValueError: There are no files, a column is missing, or a cell is not a number.
     """
     scenario, path = scenario_for(settings), Path(settings.source)
     files = sorted(path.glob("*.csv")) if path.is_dir() else [path]
     if not files:
-        raise ValueError(f"{path}: there are no files *.csv in it")
+        raise ValueError(f"{path}: it contains no *.csv files")
     tables = [(file, read_rows(file)) for file in files]
     steps = np.concatenate([np.diff(rows[:, 0]) for _, rows in tables])
     control_dt = round(float(np.median(steps)), 6) if len(steps) else 0.0
     if not control_dt > 0:
-        raise ValueError(f"{files[0]}: expected two rows or more, whose times grow")
+        raise ValueError(
+            f"{files[0]}: expected at least two rows with increasing times"
+        )
     seat = scenario.scene.seats[0]
     centre = np.mean(seat.reach, 0) @ scenario.scene.table.rotation(seat.side)
     with whole_recording(settings.out, measured_head(settings, control_dt)) as writer:
@@ -77,10 +80,11 @@ def import_rows(settings: ImportSettings) -> Path:
 
 
 def read_rows(file: Path) -> Array:
-    """Return the rows (T, 5) of a file; nan in empty cells.
+    """Return the rows (T, 5) of a file, s and m, table frame; nan for empty cells.
 
     Raises:
-        ValueError: It cannot be read, a column is missing, or a cell is no number.
+        ValueError: The file cannot be read, a column is missing, or a cell is not a
+            number.
     """
     try:
         with file.open(newline="") as opened:
@@ -94,7 +98,7 @@ def read_rows(file: Path) -> Array:
                 )
             rows = [_row(file, reader.line_num, header, cells) for cells in reader]
     except FileNotFoundError as error:
-        raise ValueError(f"{file}: there is no such file") from error
+        raise ValueError(f"{file}: this file does not exist") from error
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{file}: cannot be read: {error}") from error
     found = np.array(rows).reshape(-1, 5)
@@ -104,11 +108,11 @@ def read_rows(file: Path) -> Array:
 
 
 def _row(file: Path, line: int, header: list[str], cells: list[str]) -> list[float]:
-    """Return the numbers (5,) of a row; nan in columns that are not there."""
+    """Return the numbers (5,) of a row; nan for missing columns."""
     if len(cells) != len(header):
         raise ValueError(
-            f"{file}, line {line}: {len(cells)} cells, expected {len(header)}; leave "
-            "those of an unseen body empty"
+            f"{file}, line {line}: {len(cells)} cells; expected {len(header)}, with "
+            "empty cells for a body that was not detected"
         )
     row = dict(zip(header, cells, strict=True))
     return [_number(file, line, row.get(name)) for name in (*PUCK, *PADDLE)]
@@ -118,7 +122,7 @@ def _number(file: Path, line: int, cell: str | None) -> float:
     try:
         return float(cell) if cell and cell.strip() else np.nan
     except ValueError:
-        raise ValueError(f"{file}, line {line}: {cell!r} is no number") from None
+        raise ValueError(f"{file}, line {line}: {cell!r}; expected a number") from None
 
 
 def export_rows(
@@ -126,14 +130,14 @@ def export_rows(
 ) -> Path:
     """Write positions of puck and paddle as CSV files; return their folder.
 
-    They are the true ones in simulation, and the measured ones of a real table.
+    The positions are true in simulation, and measured on a real table.
 
     Raises:
-        ValueError: A folder that exists, no seat, no puck, recordings that differ, or
-            without steps.
+        ValueError: The folder exists, no seat is given, there is no puck, or recordings
+            have different environments or no steps.
     """
     if seat is None:
-        raise ValueError("--seat: the rows have one paddle; name its seat")
+        raise ValueError("--seat -1: the rows have one paddle; give its seat")
     recorded_scenario(files[0], shared_head(files))
     final = named_folder(root, name)
     with whole_folder(final) as folder:

@@ -1,4 +1,4 @@
-"""Steps of seats in recordings, as other libraries store them."""
+"""Observations, actions and spaces of seats, in the form of other libraries."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from marl_airhockey.sim.core.recording import Episode
 from marl_airhockey.types import Array
 
 GOALS = ("observation", "achieved_goal", "desired_goal")
-"""Parts of observations of goals="dict" """
+"""Parts of observations with goals="dict"."""
 OBSERVATION = "observation"
-"""Name of the column of flat observations, and beginning of those of parts"""
+"""Column of flat observations, and prefix of the columns of parts."""
 
 
 def episodes_with_steps(
     files: Sequence[Path],
 ) -> Iterator[tuple[Path, Episode]]:
-    """Yield the episodes of recordings, each with its recording's path.
+    """Yield the path of the recording and each episode that has steps.
 
     Raises:
-        ValueError: There are no steps in them, or one makes no sense; named.
+        ValueError: There are no steps, or a recording is damaged.
     """
     empty = True
     for path in files:
@@ -35,11 +35,11 @@ def episodes_with_steps(
                 empty = False
                 yield path, episode
     if empty:
-        raise ValueError(f"{files[0]}: there are no steps in it")
+        raise ValueError(f"{files[0]}: it contains no steps")
 
 
 def observations_of(path: Path, episode: Episode) -> dict[str, Array]:
-    """Return the observations (T + 1, seats, D) by part; of flat ones, the part is "".
+    """Return observations (T + 1, seats, D) by part; flat ones have the part "".
 
     Raises:
         ValueError: Observations were not recorded.
@@ -47,16 +47,16 @@ def observations_of(path: Path, episode: Episode) -> dict[str, Array]:
     names = [n for n in episode.first if n.split(".")[0] == OBSERVATION]
     if not names:
         raise ValueError(
-            f"{path}: there are no observations in it; airhockey data relabel adds them"
+            f"{path}: it contains no observations; airhockey data relabel adds them"
         )
     return {name.partition(".")[2]: all_rows(episode, name) for name in names}
 
 
 def all_rows(episode: Episode, name: str) -> Array:
-    """Return a column (T + 1, ...) with its value before the first step.
+    """Return a column (T + 1, ...) that starts with its value before the first step.
 
     Raises:
-        ValueError: It was not recorded.
+        ValueError: The column was not recorded.
     """
     if name not in episode.first or name not in episode.columns:
         raise ValueError(f"episode {episode.index}: {name} was not recorded")
@@ -64,14 +64,14 @@ def all_rows(episode: Episode, name: str) -> Array:
 
 
 def check_seat(episode: Episode, seat: int) -> None:
-    """Refuse a seat that an episode does not have.
+    """Check that an episode has a seat.
 
     Raises:
-        ValueError: There is no such seat.
+        ValueError: The seat does not exist.
     """
     seats = episode.columns["action"].shape[1]
     if not 0 <= seat < seats:
-        raise ValueError(f"--seat {seat}: the recording has {seats}")
+        raise ValueError(f"--seat {seat}: the recording has {seats} seats, from 0")
 
 
 def cut_off(episode: Episode) -> tuple[Array, Array]:
@@ -86,7 +86,7 @@ def cut_off(episode: Episode) -> tuple[Array, Array]:
 
 
 def playable(head: Mapping[str, Any]) -> dict[str, Any]:
-    """Return keywords of an environment in which a recording could be made."""
+    """Return the keywords of the environment of a recording."""
     names = ("options", "profile", "observe", "control_dt", "goals")
     return {name: head[name] for name in names if head.get(name)}
 
@@ -97,11 +97,11 @@ def spaces_of(
     """Return the spaces of observations and actions.
 
     Args:
-        head: Contents of a recording's `meta.json`.
-        seat: Index of the seat; None for all, by agent.
+        head: Metadata of a recording.
+        seat: Index of the seat; None for all seats, by agent.
 
     Raises:
-        ValueError: There is no such seat.
+        ValueError: The seat does not exist.
     """
     env = parallel_env(head["scenario"], **playable(head))
     agents = list(env.possible_agents)
@@ -115,29 +115,29 @@ def spaces_of(
 
 
 def agent_at(agents: Sequence[str], seat: int) -> str:
-    """Return the agent at a seat.
+    """Return the agent of a seat.
 
     Raises:
-        ValueError: There is no such seat.
+        ValueError: The seat does not exist.
     """
     if not 0 <= seat < len(agents):
-        raise ValueError(f"--seat {seat}: the scenario has {len(agents)}")
+        raise ValueError(f"--seat {seat}: the scenario has {len(agents)} seats, from 0")
     return agents[seat]
 
 
 def check_shapes(
     source: str, head: Mapping[str, Any], observation: Any, action: Any
 ) -> None:
-    """Refuse a dataset whose spaces are not those of the scenario's first seat.
+    """Check that a dataset has the spaces of the scenario's first seat.
 
     Args:
         source: Name of the dataset.
-        head: Contents of the new `meta.json`.
-        observation: Shape of its observations; None for parts by name.
-        action: Shape of its actions.
+        head: Metadata of the new recording.
+        observation: Shape of the observations; None for parts by name.
+        action: Shape of the actions.
 
     Raises:
-        ValueError: Another shape, named with that of the scenario.
+        ValueError: A shape differs from that of the scenario.
     """
     shown, acted = spaces_of(head, 0)
     for what, own, other in (
@@ -146,7 +146,6 @@ def check_shapes(
     ):
         if own != other:
             raise ValueError(
-                f"{source}: its {what} have the shape {other}, those of "
-                f"{head['scenario']} {own}; is it of another scenario, or of other "
-                "options?"
+                f"{source}: its {what} have the shape {other}, but {head['scenario']} "
+                f"has {own}; check the scenario and its options"
             )

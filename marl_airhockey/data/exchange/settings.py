@@ -1,4 +1,4 @@
-"""Settings of an import: what a dataset of another library does not say."""
+"""Settings of an import, for values that a dataset does not contain."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ class ImportSettings:
     """Settings of an import."""
 
     source: str
-    """Name of the dataset, or path of its files"""
+    """Name of the dataset, or path of its files."""
     scenario: str
-    """Scenario that it is of"""
+    """Scenario to which the data belong."""
     out: Path
-    """Folder of the new recording"""
+    """Folder of the new recording."""
     options: Mapping[str, Any] = field(default_factory=dict)
-    """Options of the scenario, where the dataset does not give them"""
+    """Options of the scenario that the dataset does not contain."""
     control_dt: float = 0.05
-    """Time of a step, s, where the dataset does not give it"""
+    """Time of a step, s, if the dataset does not contain it."""
     root: Path | None = None
-    """Folder of all Minari datasets; None for Minari's own"""
+    """Folder of all Minari datasets; None for Minari's own folder."""
 
     def head(self, kind: str, known: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the head of the new recording.
+        """Return the metadata of the new recording.
 
         Args:
             kind: Name of the format.
-            known: What the dataset says of options, profile, observe, control_dt and
+            known: Values in the dataset of options, profile, observe, control_dt and
                 goals.
         """
         goals = {"goals": known["goals"]} if known.get("goals") else {}

@@ -1,11 +1,12 @@
-"""Trajectories of the paper's authors: HDF5 files with a row for each control tick.
+"""HDF5 trajectories of the paper's authors, with a row for each control step.
 
 A file `trajectory_data{i}.hdf5` has `train_vals` (T, 35): time, trajectory, step,
 emergency stop, safety, pose, speed, force, acceleration, target pose, puck. Older files
-have no puck (32), and no safety either (31, or 32 with a column more). Poses are of the
-tool in the robot's base frame, whose x axis points from the table to the robot and past
-it. The puck is in the authors' table frame, whose x is that of the robot plus `OFFSET`;
-its third number is 1 where it was not seen. Pictures, `train_img`, stay in the file.
+have no puck (32 columns), or neither puck nor safety (31 columns, or 32 with a further
+column). Poses are those of the tool in the robot's base frame. Its x axis points from
+the table to the robot and past it. The puck is in the authors' table frame, whose x is
+that of the robot plus `OFFSET`. Its third number is 1 where it was not detected. The
+images `train_img` are not read.
 """
 
 from __future__ import annotations
@@ -51,16 +52,16 @@ FIELDS = {
     "target_pose": 6,
     "puck": 3,
 }
-"""Number of columns of each field of `train_vals`"""
+"""Number of columns of each field of `train_vals`."""
 TAIL = "tail"
-"""Field of the last ten columns of files of 32 columns without safety"""
+"""Field of the last ten columns of files with 32 columns and without safety."""
 ALL = tuple(FIELDS)
 LAYOUTS: dict[int, tuple[str, ...]] = {
     35: ALL,
     32: ALL[:-1],
     31: tuple(name for name in ALL[:-1] if name != "safe"),
 }
-"""Fields in the order of their columns, by the number of columns"""
+"""Fields in the order of their columns, by the number of columns."""
 OLDEST = (
     "time",
     "trajectory",
@@ -71,15 +72,15 @@ OLDEST = (
     "force",
     TAIL,
 )
-"""Fields of files of 32 columns without safety"""
+"""Fields of files with 32 columns and without safety."""
 ROBOT = "robot."
-"""Beginning of the names of columns that hold the fields as they are in the file"""
+"""Prefix of the columns that contain the fields of a file unchanged."""
 OFFSET = 1.2
-"""Position of the authors' table frame along the x axis of the robot's base, m"""
+"""Position of the authors' table frame along the x axis of the robot's base, m."""
 HEIGHT, TOOL = 0.30, (0.0, np.pi, 0.0)
-"""Height of the tool on the table, m, and its rotation vector in exported files, rad"""
+"""Height, m, and rotation vector, rad, of the tool on the table in exported files."""
 FULL = np.array([0.26, 0.12])
-"""(2,) displacement of the target pose that the authors call an action of 1, m"""
+"""Displacement of the target pose (2,), m, that corresponds to an action of 1."""
 FILE = re.compile(r"trajectory_data(\d+)\.(hdf5|h5)$")
 VALUES = "train_vals"
 
@@ -87,10 +88,11 @@ VALUES = "train_vals"
 def import_trajectories(settings: ImportSettings) -> Path:
     """Write the authors' trajectories as a recording; return its path.
 
-    `state.*` is in our table frame; the fields of the file are kept as `robot.*`.
+    `state.*` is in the table frame of this library. The fields of the file are stored
+    unchanged as `robot.*`.
 
     Raises:
-        ValueError: No such files, or one with other columns; names it.
+        ValueError: There are no files, or a file has other columns.
     """
     require("h5py", "offline")
     scenario, files = scenario_for(settings), trajectory_files(settings.source)
@@ -98,7 +100,7 @@ def import_trajectories(settings: ImportSettings) -> Path:
     steps = np.concatenate([np.diff(fields["time"][:, 0]) for _, fields in tables])
     control_dt = round(float(np.median(steps)), 3)
     if not control_dt > 0:
-        raise ValueError(f"{settings.source}: times do not grow")
+        raise ValueError(f"{settings.source}: times must increase")
     head = measured_head(settings, control_dt)
     with whole_recording(settings.out, head) as writer:
         for file, fields in tables:
@@ -121,10 +123,10 @@ def import_trajectories(settings: ImportSettings) -> Path:
 
 
 def trajectory_files(source: str) -> list[Path]:
-    """Return the files of trajectories that a path names, in order of their numbers.
+    """Return a file, or the files of trajectories in a folder, sorted by number.
 
     Raises:
-        ValueError: There are none.
+        ValueError: There are no files.
     """
     path = Path(source)
     files = [path] if path.is_file() else [*path.glob("trajectory_data*")]
@@ -133,15 +135,15 @@ def trajectory_files(source: str) -> list[Path]:
     if path.is_file():
         return [path]
     if not numbered:
-        raise ValueError(f"{source}: there are no files trajectory_data*.hdf5 in it")
+        raise ValueError(f"{source}: it contains no trajectory_data*.hdf5 files")
     return [file for _, file in numbered]
 
 
 def _read(file: Path) -> Columns:
-    """Return the fields (T, n) of a file.
+    """Return the fields (T, n) of a file, by name.
 
     Raises:
-        ValueError: It cannot be read, or has other columns; names the file.
+        ValueError: The file cannot be read, or has other columns.
     """
     import h5py
 
@@ -153,24 +155,24 @@ def _read(file: Path) -> Columns:
     columns = values.shape[1] if values.ndim == 2 else 0
     if columns not in LAYOUTS or len(values) < 2:
         raise ValueError(
-            f"{file}: {VALUES} has the shape {values.shape}, expected two rows or more "
-            f"of {' or '.join(map(str, LAYOUTS))} columns"
+            f"{file}: {VALUES} has the shape {values.shape}; expected at least two "
+            f"rows of {' or '.join(map(str, LAYOUTS))} columns"
         )
     if not np.isfinite(values).all():
         row = int(np.flatnonzero(~np.isfinite(values).all(1))[0])
         raise ValueError(f"{file}: row {row} is not finite")
     names = LAYOUTS[columns]
     if columns == 32 and not np.isin(values[:, 4], (0.0, 1.0)).all():
-        names = OLDEST  # The column of safety holds a coordinate.
+        names = OLDEST  # The column of safety contains a coordinate.
     ends = np.cumsum([FIELDS.get(name, 10) for name in names])[:-1]
     return dict(zip(names, np.split(values, ends, axis=1), strict=True))
 
 
 def _puck(file: Path, values: Array) -> Array:
-    """Return the puck (T, 2), our table frame, m; nan where it was not seen.
+    """Return positions of the puck (T, 2), table frame, m; nan if not detected.
 
     Some files have the puck in the robot's frame, or a flag that is 1 where it *was*
-    seen. A puck that was not seen keeps its position, which tells the flags apart.
+    detected. A puck that was not detected does not move, which distinguishes the flags.
     """
     place, hidden = values[:, :2].copy(), values[:, 2] > 0.5
     moved = np.append(True, (np.diff(place, axis=0) != 0).any(1))
@@ -178,7 +180,7 @@ def _puck(file: Path, values: Array) -> Array:
         hidden = ~hidden
     shown = place[~hidden]
     if not len(shown):
-        raise ValueError(f"{file}: the puck is not seen in it")
+        raise ValueError(f"{file}: the puck is never detected")
     if np.median(shown[:, 0]) < -1.0:
         place[:, 0] += OFFSET
     place[hidden] = np.nan
@@ -186,13 +188,13 @@ def _puck(file: Path, values: Array) -> Array:
 
 
 def _actions(fields: Columns) -> Array:
-    """Return the actions (T - 1, 2) as the authors scale them, our table frame."""
+    """Return actions (T - 1, 2) in the table frame, with the authors' scaling."""
     gap = _target(fields)[:-1, :2] - fields["pose"][:-1, :2]
     return np.asarray(np.clip(-gap / FULL, -1.0, 1.0))
 
 
 def _target(fields: Columns) -> Array:
-    """Return the target poses (T, 6): in a tail, the columns most like the poses."""
+    """Return target poses (T, 6); in a tail, the columns that are closest to poses."""
     if TAIL not in fields:
         return fields["target_pose"]
     tail, pose = fields[TAIL], fields["pose"]
@@ -209,20 +211,20 @@ def _ego(scenario: Scenario, seat: int) -> Array:
 def export_trajectories(
     files: Sequence[Path], name: str, root: Path | None = None, seat: int | None = 0
 ) -> Path:
-    """Write the episodes of recordings as the authors' trajectories; return the folder.
+    """Write recordings as the authors' trajectories; return their folder.
 
-    Fields that came from such files are written as they were. Others are made of the
-    true state: force and acceleration are 0 then.
+    Fields that were imported from such files are written unchanged. Otherwise they are
+    computed from the true state, with force and acceleration 0.
 
     Raises:
-        ValueError: A folder that exists, no seat, no puck, recordings that differ, or
-            without steps.
+        ValueError: The folder exists, no seat is given, there is no puck, or recordings
+            have different environments or no steps.
     """
     require("h5py", "offline")
     import h5py
 
     if seat is None:
-        raise ValueError("--seat: a trajectory is that of one paddle; name it")
+        raise ValueError("--seat -1: a trajectory is of one paddle; give its seat")
     head, final = shared_head(files), named_folder(root, name)
     with whole_folder(final) as folder:
         scenario = recorded_scenario(files[0], head)
@@ -239,13 +241,13 @@ def export_trajectories(
 
 
 def _kept_fields(episode: Episode) -> Columns:
-    """Return the fields (T + 1, n) of the file that an episode comes from, if any."""
+    """Return the fields (T + 1, n) of the imported file of an episode, if any."""
     names = [n for n in (*FIELDS, TAIL) if ROBOT + n in episode.columns]
     return {name: all_rows(episode, ROBOT + name) for name in names}
 
 
 def _fields(number: int, episode: Episode, seat: int, rotation: Array) -> Columns:
-    """Return the fields (T + 1, n) made of the states of an episode."""
+    """Return the fields (T + 1, n) that are computed from the states of an episode."""
     position = all_rows(episode, "state.position")
     velocity = all_rows(episode, "state.velocity")
     action = np.concatenate([episode.columns["action"][:, seat], np.zeros((1, 2))])

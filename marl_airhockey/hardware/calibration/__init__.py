@@ -1,1 +1,1 @@
-"""Calibration: makes a rig's file from a camera, printed tags and an arm."""
+"""Calibration, which writes a rig's file with a camera, printed tags and an arm."""

@@ -1,9 +1,9 @@
-"""Arm: identification of its response to commands, by steps and chirps.
+"""Identification of an arm's response to commands, by steps and chirps.
 
 The model is a dead time followed by a critically damped lag of second order, as for
 simulated arms (`core.servo`). A least-squares fit of the reported positions to the
 model's response gives both parameters. Gain and phase at some frequencies, which need
-no model, show whether it fits.
+no model, show whether the model fits.
 """
 
 from __future__ import annotations
@@ -23,25 +23,26 @@ from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 STEP_SPEED, STEP_SECONDS = 0.4, 0.4
-"""Speed of the steps back and forth, m/s, and time of each step, s"""
+"""Speed of the steps back and forth, m/s, and time of each step, s."""
 STEPS = 16
-"""Number of steps of a trial"""
+"""Number of steps of a trial."""
 CHIRP_SPEED = 0.25
-"""Largest speed of a chirp, m/s"""
+"""Largest speed of a chirp, m/s."""
 CHIRP = (0.5, 5.0)
-"""First and last frequency of a chirp, Hz"""
+"""First and last frequency of a chirp, Hz."""
 CHIRP_SECONDS = 12.0
-"""Time of a chirp, s"""
+"""Time of a chirp, s."""
 GRID = 0.001
-"""Time between the samples of the model's response, s"""
+"""Time between the samples of the model's response, s."""
 FIRST, NUDGE = (0.01, 0.06), 1e-4
-"""Initial dead time and half-rise time of the fit, and the step of its slopes, s"""
+"""Initial dead time and half-rise time of the fit, and the step of its finite
+differences, s."""
 LONGEST = 0.4
-"""Largest dead time and half-rise time, s"""
+"""Largest dead time and half-rise time, s."""
 SETTLE = 0.5
-"""Time of the motion before the fitted part, s"""
+"""Time of the motion before the fitted part, s."""
 FREQUENCIES = (1.0, 2.0, 3.0, 4.0)
-"""Frequencies at which gain and phase are reported, Hz"""
+"""Frequencies at which gain and phase are reported, Hz."""
 Path = Callable[[float], tuple[Array, Array]]
 
 
@@ -50,17 +51,17 @@ class ArmTrial:
     """Result of one motion along one axis."""
 
     motion: str
-    """``steps`` or ``chirp``"""
+    """``steps`` or ``chirp``."""
     axis: str
-    """``x`` or ``y`` of the table frame"""
+    """``x`` or ``y`` of the table frame."""
     action_delay: float
-    """Dead time, s"""
+    """Dead time, s."""
     servo_time: float
-    """Time to 50 % of a step of the lag, s"""
+    """Time to 50 % of a step of the lag, s."""
     misfit: float
-    """Root mean square residual of the model, m"""
+    """Root mean square residual of the model, m."""
     response: dict[float, tuple[float, float]]
-    """Gain and phase, deg, by frequency, Hz; empty for steps"""
+    """Gain and phase, deg, by frequency, Hz; empty for steps."""
 
 
 def measure_arm(
@@ -160,7 +161,7 @@ def _lagged(given: Array, half: float) -> Array:
     """Return the response of the critically damped lag to sampled positions.
 
     Args:
-        given: (n,) commanded positions, `GRID` apart, m.
+        given: Commanded positions (n,), `GRID` apart, m.
         half: Time to 50 % of a step, s.
     """
     w = HALF / max(half, 1e-4)

@@ -1,4 +1,4 @@
-"""Session: the steps of a calibration that are common to all cameras."""
+"""Steps of a calibration that are common to all cameras."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from marl_airhockey.hardware.vision.lens import CameraView, Lens
 from marl_airhockey.types import Array
 
 PADDLE_TOP = 0.06
-"""Height of the centre of a paddle's outline from above, m"""
+"""Height of the centre of a paddle's outline from above, m."""
 AVERAGED = 6
-"""Number of frames over which corners and positions are averaged"""
+"""Number of frames over which corners and positions are averaged."""
 
 Needed = TypeVar("Needed")
 
@@ -40,22 +40,22 @@ class FoundByCamera:
     """Results so far of the steps that need only a camera."""
 
     boards: list[tuple[Array, Array]] = field(default_factory=list)
-    """Corners of the board and their numbers, for each taken picture"""
+    """Corners of the board and their numbers, for each image."""
     lens: Lens | None = None
     corners: list[tuple[float, float]] = field(default_factory=list)
-    """Clicked corners of the field, px, in the order of `Table.vertices`"""
+    """Clicked corners of the field, px, in the order of `Table.vertices`."""
     view: CameraView | None = None
     tags: dict[int, Array] = field(default_factory=dict)
-    """Corners (4, 2) of the tags by number, field frame, m"""
+    """Corners (4, 2) of the tags by number, field frame, m."""
     paddle: Colour | None = None
 
 
 class CameraSession:
-    """Session of a calibration of one camera over one field.
+    """Calibration session of one camera over one field.
 
     Args:
         camera: Open camera over the field.
-        corners: (n, 2) corners of the field, counter-clockwise, field frame, m.
+        corners: Corners (n, 2) of the field, counter-clockwise, field frame, m.
         radius: Radius of the paddle on the field, m.
         path: Path of the rig's file.
         measured: Measured corners (4, 2) of tags by number, field frame, m; None to
@@ -85,21 +85,23 @@ class CameraSession:
             "paddle": self.click_paddle,
             "save": self.save,
         }
-        """Functions of the orders, by name"""
+        """Functions of the commands, by name."""
 
     def do(self, order: str, x: float = 0.0, y: float = 0.0) -> None:
-        """Carry out an order.
+        """Execute a command.
 
         Args:
-            order: Name of the order, see `orders`.
+            order: Name of the command, see `orders`.
             x: Column of a click, px.
             y: Row of a click, px.
 
         Raises:
-            ValueError: The order is unknown, or cannot be carried out.
+            ValueError: The command is unknown or fails.
         """
         if order not in self.orders:
-            raise ValueError(f"{order!r}: there are {', '.join(self.orders)}")
+            raise ValueError(
+                f"{order!r} is unknown; expected one of {', '.join(self.orders)}"
+            )
         with self._busy:
             if order in ("corner", "puck", "paddle"):
                 self.orders[order](float(x), float(y))
@@ -109,7 +111,7 @@ class CameraSession:
     # Steps.
 
     def take_board(self) -> None:
-        """Take a picture of the ChArUco board.
+        """Take an image of the ChArUco board.
 
         Raises:
             ValueError: Too few corners of the board are seen.
@@ -122,12 +124,12 @@ class CameraSession:
         self.found.boards.append(seen)
 
     def solve_lens(self) -> None:
-        """Find the lens from the pictures of the board."""
+        """Find the lens from the images of the board."""
         height, width = self._frame().image.shape[:2]
         self.found.lens = lens_from_boards(self.found.boards, (width, height))
 
     def click_corner(self, x: float, y: float) -> None:
-        """Take a click on the next corner of the table."""
+        """Add a click on the next corner of the table."""
         if len(self.found.corners) == len(self._corners):
             raise ValueError("all corners are clicked; clear them to click again")
         self.found.corners.append((x, y))
@@ -255,7 +257,7 @@ def need(what: Needed | None, name: str) -> Needed:
         ValueError: The result is missing.
     """
     if what is None:
-        raise ValueError(f"{name} comes first")
+        raise ValueError(f"{name} is missing; complete its step first")
     return what
 
 

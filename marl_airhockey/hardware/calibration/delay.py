@@ -1,8 +1,8 @@
-"""Delay: latency of the camera and of the arm, measured by a motion of the arm.
+"""Latency of the camera and of the arm, measured by a motion of the arm.
 
-The arm moves back and forth under the camera. The time shift between the seen motion
-and the reported one, or the sent one, is a delay. A frame counts from its arrival. All
-times are of one clock.
+The arm moves back and forth under the camera. A delay is the time shift of the observed
+motion to the reported or to the sent motion. A frame counts at the time of its arrival.
+All times are of the same clock.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 AMPLITUDE, PERIOD = 0.09, 1.0
-"""Amplitude, m, and period, s, of the motion"""
+"""Amplitude, m, and period, s, of the motion."""
 WINDOW = 1.0
-"""Time of a trial, s"""
+"""Time of a trial, s."""
 LEAST_SEEN = 8
-"""Least number of frames with the paddle in a trial"""
+"""Least number of frames with the paddle in a trial."""
 LONGEST, STEP = 0.4, 0.002
-"""Largest delay of the search, and its step, s"""
+"""Largest delay of the search, and its step, s."""
 SETTLE = 1.0
-"""Time of the motion before the first trial, s"""
+"""Time of the motion before the first trial, s."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,13 @@ class Delays:
     """Delays of n trials, s."""
 
     camera: Array
-    """(n,) from a position of the paddle until its frame has arrived"""
+    """Times (n,) from a position of the paddle until its frame has arrived."""
     arm: Array
-    """(n,) from a commanded position until the arm has reached it"""
+    """Times (n,) from a commanded position until the arm has reached it."""
 
     @property
     def round_trip(self) -> Array:
-        """(n,) from a commanded position until its frame has arrived, s."""
+        """Times (n,) from a commanded position until its frame has arrived, s."""
         return self.camera + self.arm
 
 
@@ -63,7 +63,7 @@ class Watch(threading.Thread):
         self._camera, self._detector = camera, detector
         self._ended = threading.Event()
         self.rows: list[tuple[float, float, float]] = []
-        """Arrival time of a frame, s, and x and y of the paddle, m"""
+        """Arrival time of a frame, s, and x and y of the paddle, m."""
 
     def run(self) -> None:
         """Search all frames until `stop`."""
@@ -78,7 +78,7 @@ class Watch(threading.Thread):
                 self.rows.append((frame.arrived, *seen.place.tolist()))
 
     def stop(self) -> Array:
-        """End and return the rows (n, 3)."""
+        """End the thread and return the rows (n, 3)."""
         self._ended.set()
         self.join()
         return np.array(self.rows).reshape(-1, 3)
@@ -100,7 +100,7 @@ def measure_delays(
     """
     if rig.paddle is None:
         raise ValueError(
-            "the rig has no paddle's colour; calibrate again, and click the paddle"
+            "the rig has no colour of the paddle; calibrate again, and click the paddle"
         )
     table = TABLES[rig.table]
     reach = make_seat("robot", table, 0).reach
@@ -144,7 +144,7 @@ def _sway(now: float) -> tuple[Array, Array]:
 def _trial(
     seen: Array, reported: Array, sent: Array, start: float
 ) -> tuple[float, float] | None:
-    """Return the delays of the seen motion to the reported and the sent one, s.
+    """Return the delays of the observed motion to the reported and the sent one, s.
 
     Return None if the paddle is seen in too few frames.
     """
@@ -160,8 +160,9 @@ def find_delay(late: Array, early: Array) -> float:
     A constant offset between their positions is ignored.
 
     Args:
-        late: (n, 3) time, s, and position, m, of the delayed motion.
-        early: (m, 3) the same of the other motion, over a longer time.
+        late: Times, s, and positions, m, of the delayed motion (n, 3).
+        early: Times, s, and positions, m, of the other motion (m, 3), over a longer
+            time.
     """
     tried = np.arange(0.0, LONGEST, STEP)
     misfit = np.empty(len(tried))

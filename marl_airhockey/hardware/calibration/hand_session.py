@@ -1,4 +1,4 @@
-"""Session of a hand: calibration of a camera above the field of a person's paddle."""
+"""Calibration of a camera above the field of a person's paddle."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from marl_airhockey.hardware.hand_rig import HandRig
 from marl_airhockey.types import Array
 
 CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-"""Corners of a field, counter-clockwise, in half lengths and widths"""
+"""Corners of a field, counter-clockwise, in half lengths and widths."""
 
 
 class HandSession(CameraSession):
-    """Session of a calibration of one camera over the field of a hand.
+    """Calibration session of one camera over the field of a hand.
 
     Args:
         camera: Open camera over the field.
-        source: Source of its frames, see `open_source`.
+        source: Source of the camera's frames, see `open_source`.
         size: Length, away from the person, and width of the field, m.
         path: Path of the rig's file.
         measured: Measured corners of tags, see `CameraSession`.

@@ -1,4 +1,4 @@
-"""Helper: does the manual steps of a calibration in the virtual lab."""
+"""Manual steps of a calibration, done automatically in the virtual lab."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from marl_airhockey.sim.core.seat import make_seat
 from marl_airhockey.sim.core.table import TABLES
 
 GUIDED = 4.0
-"""Longest time until the arm has reached the next position, s"""
+"""Longest time until the arm has reached the next position, s."""
 PUCK = (0.3, 0.0)
-"""Position of the puck during the calibration, table frame, m"""
+"""Position of the puck during the calibration, table frame, m."""
 
 
 class HandHelper:
@@ -27,12 +27,12 @@ class HandHelper:
     def __init__(self, client: LabClient) -> None:
         self._client, self._boards = client, 0
         self.source = f"stream:{client.ask('hand', middle=[0.0, 0.0])['camera']}"
-        """Source of the frames of the hand's camera"""
+        """Source of the frames of the hand's camera."""
         self.orders: dict[str, Callable[..., None]] = {
             "show_board": self.show_board,
             "board_away": self.put_board_away,
         }
-        """Functions of the orders, by name"""
+        """Functions of the commands, by name."""
 
     def show_board(self) -> None:
         """Show the board to the camera in the next pose."""
@@ -67,7 +67,7 @@ class Helper:
             "show_board": self.show_board,
             "guide": self.guide,
         }
-        """Functions of the orders, by name"""
+        """Functions of the commands, by name."""
 
     def show_board(self) -> None:
         """Show the board to the camera in the next pose."""

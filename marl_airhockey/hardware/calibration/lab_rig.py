@@ -34,17 +34,17 @@ from marl_airhockey.sim.jit.folders import cache_folder
 from marl_airhockey.types import Array
 
 PICTURES = 8
-"""Number of frames over which the corners of tags are averaged"""
+"""Number of frames over which the corners of tags are averaged."""
 CLICKED = np.array([[0.3, 0.0, 0.003]])
-"""(1, 3) position of the puck while its colour is clicked, table frame, m"""
+"""Position (1, 3) of the puck while its colour is clicked, table frame, m."""
 RIM, DIRECTIONS = 0.034, 16
 """Distance of possible clicks from the centre of the arm's paddle, m, and number of
-their directions; the arm never hides all of them"""
+their directions; the arm never hides all of them."""
 REACH = 3
 """Radius around a click in which the colour of the paddle is taken, px; a larger part
-may be hidden by the arm"""
+may be hidden by the arm."""
 GRIPPED = np.array([[0.028, 0.0, PADDLE_TOP]])
-"""(1, 3) position of the click on the hand's paddle, field frame, m"""
+"""Position (1, 3) of the click on the hand's paddle, field frame, m."""
 
 
 def calibrate_lab(client: LabClient) -> Rig:

@@ -1,4 +1,4 @@
-"""Motion: moves the arm along a path and records sent and reported positions."""
+"""Motion of the arm along a path, with a record of sent and reported positions."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from marl_airhockey.hardware.robot import DriverState, Robot
 from marl_airhockey.types import Array
 
 PULL = 2.0
-"""Gain of the feedback that brings a drifted paddle back to its path, 1/s"""
+"""Gain of the feedback that brings a drifted paddle back to its path, 1/s."""
 PERIOD = 0.004
-"""Time between two commands, s: half of the driver's period"""
+"""Time between two commands, s: half of the robot client's period."""
 
 
 class RecordedMotion(NamedTuple):
     """Motion of the arm; times are of the monotonic clock."""
 
     reported: Array
-    """(n, 3) time, s, and position, m, that the arm reported"""
+    """Times, s, and positions, m, that the arm reported (n, 3)."""
     sent: Array
-    """(m, 3) time, s, and position, m, that was sent to the arm"""
+    """Times, s, and positions, m, that were sent to the arm (m, 3)."""
 
 
 def lead(
@@ -37,7 +37,7 @@ def lead(
 
     Args:
         robot: Connected robot.
-        home: (2,) origin of the path, table frame, m.
+        home: Origin (2,) of the path, table frame, m.
         path: Function of the time since the start, s, that returns the offset (2,) from
             home, m, and the velocity (2,), m/s.
         seconds: Length of the motion, s.

@@ -1,4 +1,4 @@
-"""Server of the calibration's page: sends frames, receives clicks and orders."""
+"""Server of the calibration's page, which sends frames and receives commands."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from marl_airhockey.hardware.calibration.camera_session import CameraSession
 
 WEB = Path(__file__).parent / "web"
 LARGEST = 512
-"""Largest size of an order, bytes"""
+"""Largest size of a command, bytes."""
 
 
 def application(
@@ -25,9 +25,9 @@ def application(
     """Return the web application of a calibration.
 
     Args:
-        session: Session that carries out the orders.
-        refusal: Function that returns the answer to a request that is refused; None to
-            accept it.
+        session: Session that executes the commands.
+        refusal: Function that returns the response to a request that is rejected, or
+            None to accept it.
     """
 
     async def page(request: Request) -> Response:
@@ -50,7 +50,7 @@ def application(
         if refused := refusal(request):
             return refused
         if int(request.headers.get("content-length", LARGEST + 1)) > LARGEST:
-            return PlainTextResponse(f"an order has at most {LARGEST} bytes\n", 413)
+            return PlainTextResponse(f"a command has at most {LARGEST} bytes\n", 413)
         try:
             given = await request.json()
             order, click = str(given.pop("do")), {k: float(v) for k, v in given.items()}

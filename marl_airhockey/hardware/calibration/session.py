@@ -1,4 +1,4 @@
-"""Session of a table: calibration of its camera, its puck and its arm."""
+"""Calibration of a table's camera, puck and arm."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 TOUCHES = 9
-"""Least number of positions at which the paddle touches the table"""
+"""Least number of positions at which the paddle touches the table."""
 LOOSE = 0.005
-"""Largest accepted error of the robot's fit, m"""
+"""Largest accepted error of the robot's fit, m."""
 
 
 @dataclass
@@ -35,14 +35,14 @@ class Found(FoundByCamera):
 
     puck: Colour | None = None
     places: list[Array] = field(default_factory=list)
-    """Positions (2,) of the paddle on the table, table frame, m"""
+    """Positions (2,) of the paddle on the table, table frame, m."""
     poses: list[Array] = field(default_factory=list)
-    """Poses (6,) of the arm's tool at these positions, base frame, m and rad"""
+    """Poses (6,) of the arm's tool at these positions, base frame, m and rad."""
     mounting: Mounting | None = None
 
 
 class CalibrationSession(CameraSession):
-    """Session of a calibration of one camera, one table and one arm.
+    """Calibration session of one camera, one table and one arm.
 
     Args:
         camera: Open camera over the table.
@@ -93,7 +93,9 @@ class CalibrationSession(CameraSession):
                 "the paddle is not seen at this position; move it where less is hidden"
             )
         if np.linalg.norm(after[:3] - before[:3]) > 0.0005:
-            raise ValueError("the arm moves; let it rest, then take the place")
+            raise ValueError(
+                "the arm moves; wait until it rests, then take the position"
+            )
         self.found.places.append(np.median(positions, axis=0))
         self.found.poses.append(after)
 
@@ -101,13 +103,13 @@ class CalibrationSession(CameraSession):
         """Find the table's pose in the arm's base frame.
 
         Raises:
-            ValueError: Too few positions, or positions that no pose fits.
+            ValueError: There are too few positions, or no pose fits them.
         """
         found = self.found
         if len(found.places) < TOUCHES:
             raise ValueError(
-                f"{len(found.places)} places: put the paddle on the table at {TOUCHES} "
-                "or more, all over its reach"
+                f"{len(found.places)} positions; put the paddle on the table at "
+                f"{TOUCHES} or more, all over its workspace"
             )
         poses = np.array(found.poses)
         mounting = fit_mounting(
@@ -115,7 +117,7 @@ class CalibrationSession(CameraSession):
         )
         if mounting.residual > LOOSE:
             raise ValueError(
-                f"the places fit to {1e3 * mounting.residual:.1f} mm, "
+                f"the positions fit to {1e3 * mounting.residual:.1f} mm, "
                 f"{1e3 * LOOSE:.0f} mm is allowed; put the paddle flat on the table, "
                 "and set the tool's centre to its foot"
             )

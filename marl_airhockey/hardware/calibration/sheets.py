@@ -1,4 +1,4 @@
-"""Sheets: printable tags and ChArUco board, as PDF files for A4 paper."""
+"""Printable tags and ChArUco board, as PDF files for A4 paper."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from marl_airhockey.hardware.vision.calibration import TAG, TAGS
 from marl_airhockey.types import Array
 
 DPI = 300
-"""Resolution, pixels per inch"""
+"""Resolution, pixels per inch."""
 PAGE = (0.210, 0.297)
-"""Width and height of a sheet, m"""
+"""Width and height of a page, m."""
 COUNT, EACH = 8, 4
-"""Number of tags, and number of tags on one sheet"""
+"""Number of tags, and number of tags on one page."""
 RULER = 0.1
-"""Length of the line for a check of a print's scale, m"""
+"""Length of the line for a check of a print's scale, m."""
 
 
 def _pixels(metres: float) -> int:
@@ -27,7 +27,7 @@ def _pixels(metres: float) -> int:
 
 
 def _page() -> Image.Image:
-    """Return an empty sheet with a ruler."""
+    """Return an empty page with a ruler."""
     page = Image.new("L", (_pixels(PAGE[0]), _pixels(PAGE[1])), 255)
     pen = ImageDraw.Draw(page)
     x, y = _pixels(0.02), _pixels(PAGE[1] - 0.012)

@@ -1,6 +1,6 @@
 """Cameras: sources of frames with the time at which they were taken.
 
-A `Camera` keeps only the newest frame, so that a slow reader gets no outdated one.
+A `Camera` stores only the newest frame, so that a slow reader gets no outdated one.
 """
 
 from marl_airhockey.hardware.camera.camera import (

@@ -1,4 +1,4 @@
-"""Camera: a thread that reads frames from a source and keeps the newest."""
+"""Thread that reads frames from a source and stores the newest."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import NamedTuple, Protocol, Self
 from marl_airhockey.types import Array
 
 TRANSIT_WEIGHT = 0.1
-"""Weight of the newest frame in the mean time of transit"""
+"""Weight of the newest frame in the mean time of transit."""
 STALE = 0.1
-"""Age of the newest frame beyond which frames are missing, s"""
+"""Age of the newest frame beyond which frames are missing, s."""
 
 
 class CameraError(RuntimeError):
@@ -24,36 +24,34 @@ class CameraFrame(NamedTuple):
     """Frame of a camera."""
 
     image: Array
-    """(H, W, 3) uint8, blue, green, red"""
+    """Image (H, W, 3) uint8, blue, green, red."""
     taken: float
-    """Time of the middle of the exposure, monotonic clock, s"""
+    """Time of the middle of the exposure, monotonic clock, s."""
     number: int
-    """Number in the source, from 0 on; gaps are dropped frames"""
+    """Number of the frame in the source, from 0 on; gaps are dropped frames."""
     arrived: float = float("nan")
-    """Time at which a `Camera` received it, monotonic clock, s"""
+    """Time at which a `Camera` received it, monotonic clock, s."""
 
 
 class Source(Protocol):
     """Source of frames, read by one thread."""
 
     def open(self) -> None:
-        """Start.
+        """Start the source.
 
         Raises:
-            CameraError: There is nothing to read; the message names a fix.
+            CameraError: There is nothing to read. The message contains a remedy.
         """
 
     def read(self) -> CameraFrame | None:
         """Wait for the next frame and return it; None at the end."""
 
     def close(self) -> None:
-        """Stop; a waiting `read` returns."""
+        """Stop the source; a waiting `read` returns."""
 
 
 class Camera:
-    """Camera that keeps the newest frame of a source.
-
-    It is used in a ``with`` block.
+    """Camera that stores the newest frame of a source, used in a ``with`` block.
 
     Args:
         source: Source of the frames.
@@ -69,7 +67,7 @@ class Camera:
         self.transit = 0.0
         """Mean time from a frame's exposure until it arrived, s."""
         self.dropped = 0
-        """Number of frames that `next` did not return before a newer one came."""
+        """Number of frames that `next` did not return before a newer one arrived."""
         self._taken = -1
         self.listeners: list[Callable[[CameraFrame], None]] = []
         """Functions that get every frame, in the reading thread; they must return
@@ -119,7 +117,7 @@ class Camera:
 
     @property
     def newest(self) -> CameraFrame | None:
-        """Newest frame, which still counts as dropped; None before the first."""
+        """Newest frame, or None. It counts as dropped unless `next` returns it."""
         return self._frame
 
     @property

@@ -1,7 +1,7 @@
-"""Film: all frames of a camera in a video file that stays readable after a kill.
+"""Video file of all frames of a camera, which stays readable after a kill.
 
 A text file next to it has a line for each frame: the time at which it was taken, s,
-monotonic clock. The video has the times since its first frame.
+monotonic clock. The times in the video count from its first frame.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from marl_airhockey.sim.core.errors import require
 from marl_airhockey.types import Array
 
 SUFFIX = ".mkv"
-"""Suffix of the files: Matroska with Motion JPEG, readable as far as it was written"""
+"""Suffix of the files: Matroska with Motion JPEG, readable as far as it was written."""
 TICK, RATE = Fraction(1, 1_000_000), 30
-"""Unit of a frame's time, s, and the rate that the file names; times are the frames'
-own"""
+"""Unit of a frame's time, s, and the nominal frame rate of the file; the frames have
+their own times."""
 MOST = 90
-"""Largest number of frames in the queue: 80 MB of 640 x 480"""
+"""Largest number of frames in the queue: 80 MB of 640 x 480."""
 QUALITY = 92
-"""JPEG quality"""
+"""JPEG quality."""
 
 
 class _Disk:
-    """File whose first error of writing is kept: PyAV would raise one of its own.
+    """File that stores its first write error, as PyAV would raise a different one.
 
     Args:
         path: Path of the file.
@@ -60,7 +60,7 @@ class _Disk:
 
 
 class Film:
-    """Film of a camera, written by its own thread until it is closed.
+    """Video of a camera, written by its own thread until it is closed.
 
     Args:
         camera: Open camera.
@@ -96,10 +96,10 @@ class Film:
         """Description of what is missing in the file; "" if it is complete."""
         if self._failure:
             kept, why = self._kept, self._failure
-            return f"{self._path}: ends after {kept} pictures: {why}"
+            return f"{self._path}: ends after {kept} frames: {why}"
         if self._dropped:
             return (
-                f"{self._path}: {self._dropped} pictures are missing, as they arrived "
+                f"{self._path}: {self._dropped} frames are missing, as they arrived "
                 "faster than they could be written"
             )
         return ""
@@ -113,19 +113,19 @@ class Film:
             self._dropped += 1
 
     def _write(self) -> None:
-        """Write frames as they arrive, until the disk takes no more."""
+        """Write frames as they arrive, until the disk accepts no more."""
         try:
             while (frame := self._waiting.get()) is not None:
                 self._append(frame)
         except OSError as error:
-            # What is written stays.
+            # The frames written so far remain.
             self._failure = error.strerror or str(error)
 
     def _append(self, frame: CameraFrame) -> None:
         """Append a frame and its time.
 
         Raises:
-            OSError: The disk takes no more.
+            OSError: The disk accepts no more.
         """
         import av
 
@@ -134,7 +134,7 @@ class Film:
         quality = [cv2.IMWRITE_JPEG_QUALITY, QUALITY]
         packet = av.Packet(cv2.imencode(".jpg", frame.image, quality)[1].tobytes())
         packet.stream, packet.time_base, packet.is_keyframe = self._stream, TICK, True
-        # A time of the file has a resolution of 1 ms, and never goes back.
+        # Times in the file have a resolution of 1 ms and always increase.
         pts = round((frame.taken - self._began) / TICK)
         self._pts = packet.pts = packet.dts = max(pts, self._pts + 1000)
         self._container.mux_one(packet)
@@ -145,7 +145,7 @@ class Film:
         self._last = count, frame.taken
 
     def _keep_time(self) -> None:
-        """Write the time of the newest frame: it is on the disk with the next one."""
+        """Write the time of the newest frame, which the next one puts on the disk."""
         if self._last is not None:
             self._times.write(f"{self._last[1]:.6f}\n")
             self._kept += 1
@@ -155,7 +155,7 @@ class Film:
         import av
 
         self._file = _Disk(self._path, self._broken)
-        # Each frame is on the disk at once, so that a kill loses none.
+        # Each frame is written to the disk immediately, so that a kill loses none.
         options = {"flush_packets": "1", "cluster_time_limit": "1"}
         self._container = av.open(self._file, "w", format="matroska", options=options)
         self._stream = self._container.add_stream("mjpeg", RATE)
@@ -181,15 +181,15 @@ class Film:
 
 
 def times_file(path: Path) -> Path:
-    """Return the path of the file with a film's times."""
+    """Return the path of the file with the times of a video."""
     return path.with_suffix(".times.txt")
 
 
 def read_times(path: Path) -> Array:
-    """Return the times (N,) at which the frames of a film were taken, s.
+    """Return the times (N,) at which the frames of a video were taken, s.
 
     Raises:
-        ValueError: The file of times is missing or holds something else.
+        ValueError: The file of times is missing or has other content.
     """
     file = times_file(path)
     try:
@@ -197,4 +197,6 @@ def read_times(path: Path) -> Array:
         lines = file.read_text().split("\n")[:-1]
         return np.array([float(line) for line in lines])
     except (OSError, ValueError) as error:
-        raise ValueError(f"{file}: cannot read the film's times: {error}") from error
+        raise ValueError(
+            f"{file}: cannot read the times of the video: {error}"
+        ) from error

@@ -23,10 +23,10 @@ from marl_airhockey.hardware.camera.v4l2 import (
 from marl_airhockey.types import Array
 
 HEADER = struct.Struct(">4sQdII")
-"""Header of a frame in a stream: `MAGIC`, number, time taken, height, width"""
+"""Header of a frame in a stream: `MAGIC`, number, time taken, height, width."""
 MAGIC = b"AIRF"
 CONNECT = 3.0
-"""Longest time until a stream is connected, s"""
+"""Longest time until a stream is connected, s."""
 
 
 class FileSource:
@@ -34,7 +34,7 @@ class FileSource:
 
     Args:
         path: Path of the file.
-        realtime: Whether to wait between frames until their times.
+        realtime: True to wait for the time of each frame.
     """
 
     def __init__(self, path: str | Path, realtime: bool = True) -> None:
@@ -47,7 +47,7 @@ class FileSource:
         if not self._path.exists() or not self._capture.isOpened():
             raise CameraError(f"{self._path}: there is no video that OpenCV can read")
         self.rate = self._capture.get(cv2.CAP_PROP_FPS) or 30.0
-        """Mean number of frames a second."""
+        """Mean number of frames per second."""
         self._began = time.monotonic() if self._realtime else 0.0
 
     def read(self) -> CameraFrame | None:
@@ -169,15 +169,15 @@ def pack_frame(frame: CameraFrame) -> bytes:
 
 
 def open_source(text: str, latency: float = LATENCY) -> Source:
-    """Return the source that a text names.
+    """Return the source that a text describes.
 
     Args:
-        text: ``v4l2:0`` with settings (``v4l2:0,exposure=60,gain=20``, see
+        text: Camera ``v4l2:0`` with settings (``v4l2:0,exposure=60,gain=20``, see
             `CaptureSettings`), ``stream:PORT``, or the path of a video.
         latency: Latency of a V4L2 camera, s, see `CapturedSource`.
 
     Raises:
-        ValueError: The text names no source, or a setting is unknown.
+        ValueError: The text describes no source, or a setting is unknown.
     """
     kind, _, rest = text.partition(":")
     if kind in ("v4l2", "stream"):

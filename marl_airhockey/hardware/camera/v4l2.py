@@ -1,7 +1,7 @@
 """Camera of this machine, by V4L2, with all automatic controls switched off.
 
 Automatic exposure, gain and white balance would change the calibrated colours. They are
-switched off whatever else is set.
+always switched off.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from marl_airhockey.hardware.camera.camera import CameraError, CameraFrame
 
 LATENCY = 0.025
 """Latency without a measurement, from the middle of an exposure until its frame has
-arrived, s: half an exposure of 8 ms, the readout and the transfer of a PS Eye"""
+arrived, s: half an exposure of 8 ms, the readout and the transfer of a PS Eye."""
 GET_CONTROL, SET_CONTROL = 0xC008561B, 0xC008561C
-"""Requests VIDIOC_G_CTRL and VIDIOC_S_CTRL of the kernel's interface, videodev2.h"""
+"""Requests VIDIOC_G_CTRL and VIDIOC_S_CTRL of the kernel's interface, videodev2.h."""
 SLOWER = 0.05
-"""Share by which the frame rate may differ from the requested one"""
+"""Share by which the frame rate may differ from the requested one."""
 RECENT = 1.0
-"""Age of a driver's time stamp beyond which it is of another clock, s"""
+"""Age of a kernel driver's time stamp beyond which it is of another clock, s."""
 CONTROL = struct.Struct("=Ii")
-"""Number of a control and its value"""
+"""Number of a control and its value."""
 AUTOMATIC = {
     "exposure": (0x009A0901, 1),
     "gain": (0x00980912, 0),
     "white balance": (0x0098090C, 0),
 }
-"""Automatic controls, and the values that switch them off"""
+"""Automatic controls, and the values that switch them off."""
 CONTROLS = {
     "exposure": (0x009A0902, 0x00980911),
     "gain": (0x00980913,),
     "white_balance": (0x0098091A,),
 }
-"""Controls of each setting; a camera has one of them"""
+"""Controls of each setting; a camera has one of them."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,13 @@ class CaptureSettings:
     """
 
     width: int = 640
-    """px"""
+    """Width of the frames, px."""
     height: int = 480
-    """px"""
+    """Height of the frames, px."""
     rate: int = 60
-    """Frame rate, 1/s"""
+    """Frame rate, 1/s."""
     exposure: int | None = None
-    """None keeps the camera's present value, here and below"""
+    """Exposure. None keeps the present value, here and in the next two fields."""
     gain: int | None = None
     white_balance: int | None = None
 
@@ -113,7 +113,7 @@ class CapturedSource:
         capture = cv2.VideoCapture(self._device, cv2.CAP_V4L2)
         if not capture.isOpened():
             raise CameraError(
-                f"{self._path} cannot be opened; end other programs that use it"
+                f"{self._path} cannot be opened; close other applications that use it"
             )
         self._capture = capture
         # By default, a PS Eye sends raw Bayer frames at 30 Hz.
@@ -140,10 +140,10 @@ class CapturedSource:
         self._set_controls()
 
     def _check_device(self) -> None:
-        """Refuse a device that does not exist or that may not be opened.
+        """Check that the device exists and may be opened.
 
         Raises:
-            CameraError: The device is refused; the message names a fix.
+            CameraError: The device cannot be used. The message contains a remedy.
         """
         if not self._path.exists():
             there = sorted(str(path) for path in Path("/dev").glob("video*"))
@@ -160,7 +160,7 @@ class CapturedSource:
         """Switch automatic controls off and apply the given settings.
 
         Raises:
-            CameraError: The camera refuses a given value.
+            CameraError: The camera rejects a given value.
         """
         descriptor = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)
         try:
@@ -194,10 +194,11 @@ class CapturedSource:
         return CameraFrame(image, self._arrival() - self._latency, self._count - 1)
 
     def _arrival(self) -> float:
-        """Return the time at which the frame that was read arrives if nothing waits, s.
+        """Return the arrival time of the last frame without waiting time, s.
 
-        The driver's time stamp does not depend on when this process is served. The
-        latency counts from the least time between the stamp and the arrival.
+        The time stamp of the kernel driver does not depend on the scheduling of this
+        process. The latency counts from the least time between the stamp and the
+        arrival.
         """
         now = time.monotonic()
         stamp: float = 1e-3 * self._capture.get(cv2.CAP_PROP_POS_MSEC)
@@ -212,7 +213,7 @@ class CapturedSource:
 
 
 def _ioctl(descriptor: int, request: int, data: bytes) -> bytes:
-    import fcntl  # Which Windows lacks; there no camera's controls are read.
+    import fcntl  # Windows lacks it and has no V4L2.
 
     return fcntl.ioctl(descriptor, request, data)
 
@@ -227,7 +228,7 @@ def _get_control(descriptor: int, control: int) -> int | None:
 
 
 def _set_control(descriptor: int, control: int, value: int) -> bool:
-    """Set a control; return False if the camera refuses it."""
+    """Set a control; return False if the camera rejects it."""
     try:
         _ioctl(descriptor, SET_CONTROL, CONTROL.pack(control, value))
     except OSError:

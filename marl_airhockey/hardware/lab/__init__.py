@@ -1,1 +1,1 @@
-"""Virtual lab: a simulated table that speaks the protocols of the real one."""
+"""Virtual lab: a simulated table with the network protocols of the real one."""

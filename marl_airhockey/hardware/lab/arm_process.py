@@ -60,7 +60,7 @@ def run_arm(setup: LabSetup, memory: Any, pipe: Connection) -> None:
     }
 
     async def serve() -> None:
-        """Serve the ports and obey the pipe."""
+        """Serve the ports and execute the requests of the pipe."""
         ended = asyncio.Event()
 
         def obey() -> None:

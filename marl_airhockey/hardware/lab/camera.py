@@ -20,20 +20,20 @@ from marl_airhockey.types import Array
 CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 49)[:-1]) for f in (np.cos, np.sin)], 1)
 FELT, FLOOR, LINES = (222, 226, 224), (70, 75, 70), (205, 190, 180)
 PADDLE = (70, 165, 60)
-"""Colours: blue, green, red"""
+"""Colours: blue, green, red."""
 NOISE = 4.0
-"""Standard deviation of a pixel's noise"""
+"""Standard deviation of a pixel's noise."""
 NOISES = 6
-"""Number of different noise images"""
+"""Number of different noise images."""
 SHADOW = np.array([0.004, -0.006])
-"""Offset (2,) of the shadow of a body about 1 cm high, m"""
+"""Offset (2,) of the shadow of a body about 1 cm high, m."""
 PADDLE_TOP = 0.06
-"""Height of a paddle's top, m"""
+"""Height of a paddle's top, m."""
 AROUND = 24
-"""Margin around moving objects that is drawn in each frame, px"""
+"""Margin around moving objects that is drawn in each frame, px."""
 
 What = TypeVar("What")
-"""Moving objects before a camera in the middle of an exposure"""
+"""Moving objects in front of a camera in the middle of an exposure."""
 
 
 class LabCamera(ABC, Generic[What]):
@@ -59,7 +59,7 @@ class LabCamera(ABC, Generic[What]):
         self._light: Array = np.ones(1)
         self._shown: Array | None = None
         self.dark = False
-        """True if the lights are off, a fault"""
+        """True if the lights are off, a fault."""
         self.move(view)
 
     @abstractmethod
@@ -103,7 +103,7 @@ class LabCamera(ABC, Generic[What]):
         still = through_lens(view, drawn).round().astype(np.uint8)
         scene = still * light
         empty = [np.clip(scene + g, 0, 255).astype(np.uint8) for g in self._grain]
-        # Assigned last and at once, as frames are taken meanwhile by another thread.
+        # Assigned last and together, as another thread takes frames in the meantime.
         self.view, self._light, self._still, self._empty = view, light, still, empty
 
     def show_board(self, number: int | None) -> None:

@@ -1,7 +1,7 @@
-"""Door: a loopback port at which other processes send orders to a service.
+"""RPC server on a loopback port for requests of other processes.
 
-An order is a line of JSON, {"do": NAME, ...}, and so is its answer. The answer to a
-refused order is {"error": REASON}.
+A request is a line of JSON, {"do": NAME, ...}, and so is the response. The response to
+a rejected request is {"error": REASON}.
 """
 
 from __future__ import annotations
@@ -17,18 +17,19 @@ from pathlib import Path
 from typing import Any
 
 Answer = Callable[[dict[str, Any]], dict[str, Any]]
-"""Function that takes an order and returns its answer"""
+"""Function that returns the response to a request."""
 WAIT = 10.0
-"""Longest time until an answer, s"""
+"""Longest time until a response, s."""
 
 
 @contextmanager
 def open_door(answer: Answer, file: Path | None = None) -> Iterator[int]:
-    """Open a door and yield its port.
+    """Start an RPC server and yield its port.
 
     Args:
-        answer: Function that answers orders, called in threads of the clients. Its
-            ValueError, RuntimeError, KeyError or TypeError becomes the error.
+        answer: Function that returns the response to a request. It is called in the
+            threads of the clients. Its ValueError, RuntimeError, KeyError or TypeError
+            becomes the error in the response.
         file: File in which other commands find the port; None for no file.
     """
 
@@ -44,7 +45,7 @@ def open_door(answer: Answer, file: Path | None = None) -> Iterator[int]:
                 self.wfile.write(json.dumps(found).encode() + b"\n")
 
     class Server(socketserver.ThreadingTCPServer):
-        """Server of the door."""
+        """TCP server with one thread per client."""
 
         daemon_threads, allow_reuse_address = True, True
 
@@ -63,10 +64,10 @@ def open_door(answer: Answer, file: Path | None = None) -> Iterator[int]:
 
 
 class DoorClient:
-    """Client of a door.
+    """Client of an RPC server.
 
     Args:
-        port: Port of the door.
+        port: Port of the server.
         name: Name of the service, for messages.
 
     Raises:
@@ -80,10 +81,10 @@ class DoorClient:
         self._file = self._socket.makefile("rwb")
 
     def ask(self, do: str, **order: Any) -> dict[str, Any]:
-        """Send an order and return the answer.
+        """Send a request and return the response.
 
         Raises:
-            RuntimeError: The service refuses or has ended.
+            RuntimeError: The service rejects the request or has ended.
         """
         self._file.write(json.dumps({"do": do, **order}).encode() + b"\n")
         self._file.flush()
@@ -100,7 +101,7 @@ class DoorClient:
 
 
 def port_in(file: Path) -> int | None:
-    """Return the port in the file of a door; None if there is none."""
+    """Return the port in the file of a server; None if there is none."""
     try:
         return int(json.loads(file.read_text())["port"])
     except (OSError, ValueError, KeyError):

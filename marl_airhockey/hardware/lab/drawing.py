@@ -1,4 +1,4 @@
-"""Drawing of the objects before the lab's cameras."""
+"""Drawing of the objects in front of the lab's cameras."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from marl_airhockey.hardware.vision.lens import CameraView, Lens
 from marl_airhockey.types import Array
 
 SHIFT = 4
-"""Fractional bits of the pixel coordinates of edges"""
+"""Fractional bits of the pixel coordinates of edges."""
 OVER, MARGIN = 3, 80
-"""Oversampling factor of drawn scenes, and their margin, px"""
+"""Oversampling factor of drawn scenes, and their margin, px."""
 
 
 def enlarged(view: CameraView) -> CameraView:
-    """Return the larger view without distortion in which scenes are drawn."""
+    """Return the larger view without distortion that is used to draw scenes."""
     width, height = view.lens.size
     larger = view.lens.arrays[0].copy()
     larger[:2, 2] += MARGIN
@@ -66,9 +66,9 @@ def fill(
     Args:
         image: Image (h, w, 3) that is drawn on.
         view: View of the whole image.
-        corners: (n, 2) corners, table frame, m.
+        corners: Corners (n, 2), table frame, m.
         height: Height above the table, m.
-        colour: Blue, green, red.
+        colour: Colour as (blue, green, red).
         corner: Upper left pixel (x, y) of ``image`` in the whole image.
     """
     points = np.column_stack([corners, np.full(len(corners), height)])
@@ -89,7 +89,7 @@ def shade(
 
 
 def paste_tag(image: Array, view: CameraView, number: int, place: Array) -> None:
-    """Draw a printed tag with a white rim around (2,), table frame, m."""
+    """Draw a printed tag with a white rim at a position (2,), table frame, m."""
     rim = place + 1.4 * (tag_corners(place) - place)
     fill(image, view, rim, 0.0, (250, 250, 250))
     markers = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)

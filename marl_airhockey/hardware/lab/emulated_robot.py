@@ -1,8 +1,8 @@
-"""Emulated robot: a driver and its controller in this process, in emulated time.
+"""Emulated robot: robot client and controller in this process, in emulated time.
 
-The driver is that of a real arm, the controller that of `airhockey ur-emulator`.
-`InProcessArm` connects them instead of ur_rtde. Ten minutes of driving take half a
-minute, and the same calls give the same motion.
+The robot client is that of a real arm, and the controller is that of `airhockey
+ur-emulator`. `InProcessArm` connects them instead of ur_rtde. Ten minutes of motion
+take half a minute, and the same calls give the same motion.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from marl_airhockey.hardware.ur_emulator.in_process import InProcessArm
 from marl_airhockey.types import Array
 
 EVERY = round(1.0 / RATE / DT)
-"""Periods of the controller in a cycle of the driver"""
+"""Number of controller periods in a cycle of the robot client."""
 
 
 class EmulatedRobot:
@@ -70,14 +70,14 @@ class EmulatedRobot:
         self.start_driver()
 
     def start_driver(self) -> None:
-        """Start a driver, as a new process does; it replaces the current one."""
+        """Start a robot client, as a new process does; it replaces the current one."""
         self._recoveries, self._enabled = 0, False
         if not self.controller.script.running:
             self.arm.connect()
         self._box = Mailbox(Mailbox.allocate())
         self.driver = ArmDriver(self.config, self.arm, self._box, lambda: self.arm.now)
         self.driver_runs = True
-        """False for a driver whose process was killed or stalls."""
+        """False for a robot client whose process was killed or stalls."""
         self._request(np.zeros(2), 0.0)
         self.driver.cycle()
 
@@ -88,7 +88,7 @@ class EmulatedRobot:
 
     @property
     def state(self) -> DriverState:
-        """State of the driver."""
+        """State of the robot client."""
         return self.driver.supervisor.state
 
     @property
@@ -98,7 +98,7 @@ class EmulatedRobot:
 
     @property
     def transitions(self) -> list[StateChange]:
-        """Last changes of the driver's state with their reasons, the newest last."""
+        """Last changes of the state with their reasons, the newest last."""
         return self._box.transitions
 
     def get_observation(self) -> RobotObservation:
@@ -107,12 +107,12 @@ class EmulatedRobot:
 
     @property
     def true_position(self) -> Array:
-        """(3,) true position of the paddle, table frame, m."""
+        """True position (3,) of the paddle, table frame, m."""
         return self.setup.mounting.to_table(self.controller.arm.pose[:3, 3])
 
     @property
     def true_velocity(self) -> Array:
-        """(2,) true velocity of the paddle, table frame, m/s."""
+        """True velocity (2,) of the paddle, table frame, m/s."""
         return self.setup.mounting.rotate_to_table(self.controller.arm.twist)[:2]
 
     def enable(self) -> None:
@@ -129,8 +129,8 @@ class EmulatedRobot:
         """Command a velocity.
 
         Args:
-            velocity: (2,) target velocity, table frame, m/s.
-            seconds: Time in which it is to be reached, s.
+            velocity: Target velocity (2,), table frame, m/s.
+            seconds: Time of a linear ramp to the velocity, s.
         """
         self._request(velocity, seconds)
 
@@ -167,7 +167,7 @@ class EmulatedRobot:
         """Move the paddle to a position; return True if it arrived.
 
         Args:
-            position: (2,) target position, table frame, m.
+            position: Target position (2,), table frame, m.
             seconds: Longest time of the movement, s.
             near: Largest distance from the target that counts as arrived, m.
         """

@@ -11,9 +11,9 @@ TABLE_FAULTS = {
     "moved_camera": "the camera is moved by 2 cm",
     "delayed_frames": "frames arrive 0.2 s late",
     "second_puck": "a second puck lies on the table",
-    "repeated_frames": "the camera sends every picture twice",
-    "stuck_frame": "the camera sends one picture again and again",
+    "repeated_frames": "the camera sends every frame twice",
+    "stuck_frame": "the camera sends the same frame again and again",
     "lost_puck": "the puck is not on the table",
 }
 FAULTS = {**ARM_FAULTS, **TABLE_FAULTS}
-"""Descriptions of the faults, by name"""
+"""Descriptions of the faults, by name."""

@@ -12,9 +12,10 @@ from marl_airhockey.hardware.camera.sources import pack_frame
 
 
 class FrameServer:
-    """Server of a stream of frames; each client gets the newest one it has not got yet.
+    """Server of a stream of frames.
 
-    It listens only on the loopback address.
+    Each client gets the newest frame, and every frame at most once. The server listens
+    only on the loopback address.
 
     Args:
         latency: Time from when a frame is taken until it is sent to clients, s.

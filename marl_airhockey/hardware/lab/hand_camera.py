@@ -1,4 +1,4 @@
-"""Hand's camera: frames of a person's hand that moves a paddle on a field."""
+"""Camera above a person's hand that moves a paddle on a field."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from marl_airhockey.hardware.vision.lens import CameraView, Lens
 from marl_airhockey.types import Array
 
 FIELD = (0.5, 0.6)
-"""Length and width of the field, m"""
+"""Length and width of the field, m."""
 RADIUS = 0.047625
-"""Radius of the paddle, m"""
+"""Radius of the paddle, m."""
 SKIN = (120, 150, 205)
-"""Colour: blue, green, red"""
+"""Colour: blue, green, red."""
 RIM = 0.07
-"""Distance of the tags' middles from the field's edge, m"""
+"""Distance of the tags' centres from the field's edge, m."""
 HAND_HEIGHTS = np.array([0.10, 0.10, 0.14, 0.14])
-"""Heights of the corners of hand and forearm above the field, m"""
+"""Heights of the corners of hand and forearm above the field, m."""
 
 
 def hand_view() -> CameraView:
@@ -57,9 +57,9 @@ class SeenHand(NamedTuple):
     """Hand in the middle of an exposure, field frame."""
 
     place: Array | None
-    """(2,) position of the paddle, m; None without a hand"""
+    """Position (2,) of the paddle, m; None without a hand."""
     velocity: Array
-    """(2,) velocity of the paddle, m/s"""
+    """Velocity (2,) of the paddle, m/s."""
 
 
 class HandCamera(LabCamera[SeenHand]):

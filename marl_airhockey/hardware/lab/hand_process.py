@@ -1,4 +1,4 @@
-"""Process of the lab's hand: it follows ordered paths before its own camera."""
+"""Process of the lab's hand, which follows requested paths in front of its camera."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ class HandPath:
     """Path of a hand: an ellipse with a constant period."""
 
     middle: Array
-    """(2,) centre, field frame, m"""
+    """Centre (2,), field frame, m."""
     amplitude: Array
-    """(2,) half axes, m; 0 for a hand at rest"""
+    """Half axes (2,), m; 0 for a hand at rest."""
     period: float = 1.0
-    """Time of one turn, s"""
+    """Time of one turn, s."""
     began: float = 0.0
-    """Time at which it begins, monotonic clock, s"""
+    """Time at which the path begins, monotonic clock, s."""
     away: bool = False
-    """True without a hand in the image"""
+    """True if no hand is in the image."""
 
     def at(self, now: float) -> tuple[Array, Array]:
         """Return position (2,), m, and velocity (2,), m/s, at a time, s."""
@@ -66,10 +66,10 @@ def run_hand(setup: LabSetup, frame_rate: float, seed: int, pipe: Connection) ->
 
 
 def path_of(order: dict[str, Any]) -> HandPath:
-    """Return the path of an order.
+    """Return the path of a request.
 
     Args:
-        order: Order "hand" with the fields of `HandPath`.
+        order: Request "hand" with the fields of `HandPath`.
 
     Raises:
         ValueError: A number is not finite, or the period is not above 0.

@@ -1,4 +1,4 @@
-"""Lab: its processes, and the door at which other processes send it orders."""
+"""Processes of the virtual lab, and the RPC server for requests of other processes."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.jit.folders import cache_folder
 
 ANSWER = 5.0
-"""Longest time until a process of the lab answers, s"""
+"""Longest time until a process of the lab responds, s."""
 START = 300.0
-"""Longest time until a lab has started, s; the first start compiles its backend"""
+"""Longest time until a lab has started, s; the first start compiles its backend."""
 
 
 def port_file() -> Path:
-    """Return the file in which a running lab writes the port of its door."""
+    """Return the file in which a running lab writes the port of its RPC server."""
     return cache_folder() / "lab.json"
 
 
@@ -39,21 +39,22 @@ class Lab:
 
     Args:
         setup: Setup of the lab; None for the default.
-        seed: Seed of the table's physical parameters.
+        seed: Seed of the table's physics parameters.
         frame_rate: Frame rate of the cameras, 1/s.
 
     Raises:
-        RuntimeError: The extra is not installed, or a process does not start.
+        RuntimeError: The extra ``hardware`` is not installed, or a process does not
+            start.
     """
 
     def __init__(
         self, setup: LabSetup | None = None, seed: int = 0, frame_rate: float = 30.0
     ) -> None:
-        # Before a process starts: its error would be a traceback of its own.
+        # Checked here, as an error in a process would print a traceback.
         require("scipy", "hardware")
         self.setup = setup or LabSetup()
         context = multiprocessing.get_context("spawn")
-        # Referenced here, as memory without a reference is freed and used again.
+        # Stored here, as memory without a reference is freed and used again.
         self._memory = memory = context.Array("d", 7, lock=False)
         self._lock = threading.Lock()
         self._frame_rate, self._seed = frame_rate, seed
@@ -74,10 +75,10 @@ class Lab:
         self.camera_port = int(self._expect(self._table, START)["port"])
 
     def _expect(self, pipe: Connection, seconds: float = ANSWER) -> dict[str, Any]:
-        """Return the next answer of a process.
+        """Return the next response of a process.
 
         Raises:
-            RuntimeError: The process does not answer, or has failed.
+            RuntimeError: The process does not respond, or has failed.
         """
         try:
             answer = pipe.recv() if pipe.poll(seconds) else None
@@ -89,11 +90,11 @@ class Lab:
         return dict(answer)
 
     def ask(self, order: dict[str, Any]) -> dict[str, Any]:
-        """Carry out an order of a client and return the answer.
+        """Execute a request of a client and return the response.
 
         Raises:
-            ValueError: The order or the fault is unknown, or the path is invalid.
-            RuntimeError: A process does not answer.
+            ValueError: The request or the fault is unknown, or the path is invalid.
+            RuntimeError: A process does not respond.
         """
         what = order.get("do")
         if what == "info":
@@ -116,7 +117,7 @@ class Lab:
             if what in ("place", "release", "fault", "truth", "board"):
                 self._table.send(order)
                 return self._expect(self._table)
-        raise ValueError(f"order {what!r} is unknown")
+        raise ValueError(f"request {what!r} is unknown")
 
     def _info(self) -> dict[str, Any]:
         return {
@@ -187,11 +188,11 @@ class Lab:
 
 @contextmanager
 def served(lab: Lab, announce: bool = True) -> Iterator[int]:
-    """Open a lab's door on the loopback address and yield its port.
+    """Start a lab's RPC server on the loopback address and yield its port.
 
     Args:
-        lab: Lab that answers the orders.
-        announce: Whether to write the `port_file`, by which other commands find it.
+        lab: Lab that executes the requests.
+        announce: True to write the `port_file`, with which other commands find the lab.
     """
     with open_door(lab.ask, port_file() if announce else None) as port:
         yield port
@@ -201,7 +202,7 @@ class LabClient(DoorClient):
     """Client of a lab that runs in another process.
 
     Args:
-        port: Port of its door.
+        port: Port of the lab's RPC server.
 
     Raises:
         OSError: No lab listens at the port.

@@ -1,4 +1,4 @@
-"""Setup: the devices of the virtual lab and their true poses, hidden from clients."""
+"""Devices of the virtual lab and their true poses, which are hidden from clients."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from marl_airhockey.sim.core.table import TABLES, Table
 from marl_airhockey.types import Array
 
 TOOL = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
-"""Pose of the paddle's foot, flange frame, m and rad"""
+"""Pose of the paddle's foot, flange frame, m and rad."""
 ELBOW_UP = (2.9, -1.13, 1.94, -2.47, -1.57, 4.48)
 """Initial angles of the search for the start angles, rad. With the elbow up, no joint
-is faster than 0.92 pi rad/s at 0.7 m/s anywhere in the reach. With the elbow down, the
-arm is stretched at the far end, and joints are faster."""
+is faster than 0.92 pi rad/s at 0.7 m/s anywhere in the workspace. With the elbow down,
+the arm is stretched at the far end, and joints are faster."""
 LIFT = 0.02
-"""Height of the paddle above the table when the lab opens, m"""
+"""Height of the paddle above the table when the lab opens, m."""
 
 
 @dataclass(frozen=True)
@@ -32,14 +32,14 @@ class LabSetup:
     """Setup of a lab: one table with an arm at its home side."""
 
     table: str = "full_size"
-    """Name of the table's preset"""
+    """Name of the table's preset."""
     tilt: float = TILT
-    """Tilt of the table, deg"""
+    """Tilt of the table, deg."""
     plant: str = "numba"
-    """Name of the backend that moves puck and paddle"""
+    """Name of the backend that moves puck and paddle."""
     latency: float = 0.028
     """Time from the middle of an exposure until the frame is sent, s: half of the
-    exposure, the readout and the transfer"""
+    exposure, the readout and the transfer."""
 
     @cached_property
     def geometry(self) -> Table:
@@ -53,7 +53,7 @@ class LabSetup:
 
     @cached_property
     def home(self) -> Array:
-        """(2,) rest position of the paddle, table frame, m."""
+        """Rest position (2,) of the paddle, table frame, m."""
         return np.asarray(np.mean(np.asarray(self.seat.reach), 0))
 
     @cached_property
@@ -73,7 +73,8 @@ class LabSetup:
             plant: Model of what the paddle touches; None for an empty table.
 
         Raises:
-            RuntimeError: scipy is missing; the message has the command to install it.
+            RuntimeError: scipy is missing. The message contains the command to install
+                it.
             ValueError: The arm does not reach its table.
         """
         require("scipy", "hardware")

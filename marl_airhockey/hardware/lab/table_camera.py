@@ -1,4 +1,4 @@
-"""Table's camera: frames of the lab's table, which the arm hides in part."""
+"""Camera above the lab's table, which the arm hides in part."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
 PUCK, ARM = (42, 40, 205), (96, 92, 90)
-"""Colours: blue, green, red"""
+"""Colours: blue, green, red."""
 TAGS_BESIDE = 0.075
-"""Distance of the tags' centres from the table's edge, m"""
+"""Distance of the tags' centres from the table's edge, m."""
 PUCK_HEIGHT = 0.003
-"""Height of a puck's rim, m"""
+"""Height of a puck's rim, m."""
 ARM_HEIGHTS = np.array([0.10, 0.10, 0.35, 0.35])
-"""Heights of the corners of the arm's last link above the table, m"""
+"""Heights of the corners of the arm's last link above the table, m."""
 
 
 def lab_view(table: Table) -> CameraView:
@@ -57,13 +57,13 @@ class Seen:
     """Moving bodies in the middle of an exposure, table frame."""
 
     puck: Array | None
-    """(2,) position of the puck, m; None if it is not on the table"""
+    """Position (2,) of the puck, m; None if it is not on the table."""
     puck_velocity: Array
-    """(2,) velocity of the puck, m/s"""
+    """Velocity (2,) of the puck, m/s."""
     paddle: Array
-    """(2,) position of the paddle, m"""
+    """Position (2,) of the paddle, m."""
     paddle_velocity: Array
-    """(2,) velocity of the paddle, m/s"""
+    """Velocity (2,) of the paddle, m/s."""
 
 
 class TableCamera(LabCamera[Seen]):
@@ -72,7 +72,7 @@ class TableCamera(LabCamera[Seen]):
     Args:
         table: Table in the view.
         view: View of the camera.
-        base: (2,) position of the arm's base, table frame, m.
+        base: Position (2,) of the arm's base, table frame, m.
         exposure: Exposure time, s.
         seed: Seed of the image noise.
     """
@@ -87,7 +87,7 @@ class TableCamera(LabCamera[Seen]):
     ) -> None:
         self._table, self._base = table, np.asarray(base)
         self.left: Array | None = None
-        """(2,) position of a second puck at rest, m; None without one."""
+        """Position (2,) of a second puck at rest, m; None without one."""
         super().__init__(view, exposure, seed)
 
     def _draw_still(self, scene: Array, view: CameraView) -> None:
@@ -138,8 +138,8 @@ def _link(paddle: Array, base: Array) -> Array:
     """Return the corners (4, 2) of the arm's last link, table frame, m.
 
     Args:
-        paddle: (2,) position of the paddle, m.
-        base: (2,) position of the arm's base, m.
+        paddle: Position (2,) of the paddle, m.
+        base: Position (2,) of the arm's base, m.
     """
     along = base - paddle
     along = along / np.linalg.norm(along)

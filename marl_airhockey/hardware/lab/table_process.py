@@ -20,13 +20,13 @@ from marl_airhockey.hardware.lab.world import RATE, LabWorld
 from marl_airhockey.hardware.robot.nominal import BEHIND
 
 LATE = 0.25
-"""Largest lag of the loop, s; after a larger one, missed steps are skipped"""
+"""Largest lag of the loop, s; after a larger one, missed steps are skipped."""
 MOVED = 0.02
-"""Displacement of a camera under the fault moved_camera, m"""
+"""Displacement of a camera under the fault moved_camera, m."""
 DELAY = 0.2
-"""Additional latency under the fault delayed_frames, s"""
+"""Additional latency under the fault delayed_frames, s."""
 SECOND_PUCK = np.array([0.55, -0.25])
-"""(2,) position of the second puck under the fault second_puck, table frame, m"""
+"""Position (2,) of the second puck under the fault second_puck, table frame, m."""
 
 
 class TableLoop:
@@ -34,7 +34,7 @@ class TableLoop:
 
     Args:
         setup: Setup of the lab.
-        seed: Seed of the table's physical parameters and of the image noise.
+        seed: Seed of the table's physics parameters and of the image noise.
         frame_rate: Frame rate of the camera, 1/s.
         block: Memory in which the arm reports its paddle, see `PublishedTable`.
         server: Server of the frames.
@@ -93,7 +93,7 @@ class TableLoop:
     def _move_camera(self, on: bool) -> None:
         x, y, z = self._view.translation
         moved = replace(self._view, translation=(x + MOVED, y, z)) if on else self._view
-        # Beside the loop, as the new scenery takes longer than a frame.
+        # In a thread, as drawing the new scene takes longer than a frame.
         if self._moving is not None:
             self._moving.join()
         self._moving = threading.Thread(target=self._camera.move, args=(moved,))
@@ -130,7 +130,7 @@ class TableLoop:
         return CameraFrame(self._image, now, self._frames)
 
     def obey(self, order: dict[str, Any]) -> dict[str, Any]:
-        """Carry out an order of the lab's operator; return the true state."""
+        """Execute a request of the lab's operator; return the true state."""
         world = self.world
         what = order["do"]
         if what == "place":

@@ -16,9 +16,9 @@ from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array
 
 RATE = 120.0
-"""Steps a second"""
+"""Number of steps per second."""
 NEAR = 0.004
-"""Height above the table below which the paddle touches pucks, m"""
+"""Height above the table below which the paddle touches pucks, m."""
 
 
 class LabWorld:
@@ -26,7 +26,7 @@ class LabWorld:
 
     Args:
         setup: Setup of the lab.
-        seed: Seed of the table's physical parameters, which are sampled from the ranges
+        seed: Seed of the table's physics parameters, which are sampled from the ranges
             that were measured on real tables.
     """
 
@@ -39,7 +39,7 @@ class LabWorld:
         rows = np.zeros(1, np.int64)
         streams.renew(rows, np.array([seed]), np.array([1]))
         self.laws = physics.draw(streams.of("physics"))
-        """Physical parameters of this table by name, (1,) each."""
+        """Physics parameters of this table by name, arrays (1,)."""
         self._backend.set_physics(self.laws, rows)
         state = self.scene.still_state(1)
         state.paddle[0, 0] = setup.home
@@ -50,9 +50,9 @@ class LabWorld:
         self.present = False
         """True if the puck is on the table."""
         self.touches: list[float] = []
-        """Times of this world of the paddle's contacts since `put`, s."""
+        """Times of the paddle's contacts since `put`, clock of this world, s."""
         self.banks: list[tuple[float, int]] = []
-        """Times of the wall bounces since `put`, s, and their sides."""
+        """Times, s, and sides of the wall bounces since `put`, clock of this world."""
 
     def _begin(self, state: State) -> State:
         self._backend.reset(state, np.zeros(1, np.int64))
@@ -65,21 +65,21 @@ class LabWorld:
 
     @property
     def puck(self) -> Array:
-        """(2,) position of the puck, table frame, m."""
+        """Position (2,) of the puck, table frame, m."""
         return np.asarray(self._state.puck[0, 0].copy())
 
     @property
     def puck_velocity(self) -> Array:
-        """(2,) velocity of the puck, table frame, m/s."""
+        """Velocity (2,) of the puck, table frame, m/s."""
         return np.asarray(self._state.puck_velocity[0, 0].copy())
 
     def put(self, place: Array, velocity: Array, held: bool) -> None:
         """Put the puck on the table.
 
         Args:
-            place: (2,) position, table frame, m.
-            velocity: (2,) velocity after the release, table frame, m/s.
-            held: Whether the puck is held until `release`.
+            place: Position (2,), table frame, m.
+            velocity: Velocity (2,) after the release, table frame, m/s.
+            held: True to hold the puck until `release`.
         """
         position, moving = self._state.position.copy(), self._state.velocity.copy()
         puck = self.scene.bodies.puck
@@ -103,8 +103,8 @@ class LabWorld:
         """Advance by 1 / `RATE` s.
 
         Args:
-            paddle: (2,) position of the paddle at the end of the step, m.
-            velocity: (2,) velocity of the paddle, m/s.
+            paddle: Position (2,) of the paddle at the end of the step, m.
+            velocity: Velocity (2,) of the paddle, m/s.
             height: Height of the paddle's foot above the table, m.
         """
         command = Command.still(self.scene, 1)

@@ -1,9 +1,9 @@
-"""Robots: what moves a paddle on a real table, and the limits before it.
+"""Robot client of a real table, with limits on the motion of the paddle.
 
-A `Robot` runs a driver in a process of its own, which sends an `Arm` a new pose 125
-times a second. It takes commanded velocities; whatever they are, what it sends stays
-within limits of speed, acceleration, jerk and reach, and comes to rest when commands
-fail to come.
+A `Robot` runs the robot client in a separate process, which sends a new pose to an
+`Arm` 125 times a second. It accepts any commanded velocity. The motion that it sends
+stays within limits of speed, acceleration, jerk and workspace, and comes to rest when
+commands do not arrive.
 """
 
 from marl_airhockey.hardware.robot.arm import Arm, ArmFault, Reading

@@ -1,4 +1,4 @@
-"""Arm: the contract between the driver and the network of a robot."""
+"""Interface between the robot client and an arm driver."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from marl_airhockey.types import Array
 
 
 class ArmFault(IntEnum):
-    """Reason for which an arm does not follow, as it reports itself."""
+    """Reason why an arm does not follow, as the arm reports it."""
 
     NONE = 0
     PROTECTIVE_STOP = 1
@@ -22,37 +22,41 @@ class Reading(NamedTuple):
     """Newest reading of an arm, base frame."""
 
     stamp: float
-    """Time of the robot's clock, s; one that stands still is a robot that is silent"""
+    """Time of the robot's clock, s; if it does not advance, the robot is silent."""
     pose: Array
-    """(6,) of the tool's centre: m and rotation vector"""
+    """Pose (6,) of the tool's centre: position, m, and rotation vector, rad."""
     velocity: Array
-    """(6,) m/s and rad/s"""
+    """Velocity (6,) of the tool's centre, m/s and rad/s."""
     force: Array
-    """(6,) N and Nm"""
+    """Force and torque (6,) on the tool, N and Nm."""
     joints: Array
-    """(6,) angles, rad, from the base to the last wrist"""
+    """Joint angles (6,), rad, from the base to the last wrist."""
     fault: ArmFault
     speed_scaling: float
-    """Fraction of every programmed speed that the arm moves with: the speed slider"""
+    """Fraction of every programmed speed at which the arm moves (speed slider)."""
 
 
 class Arm(Protocol):
-    """Arm that follows poses of its tool; all calls return within milliseconds.
+    """Arm driver that follows poses of the tool.
 
-    `Ur5e` is one; an arm of another maker needs a class like it.
+    All calls return within milliseconds. `Ur5e` is one of them. An arm of another maker
+    needs its own class.
     """
 
     def read(self) -> Reading:
         """Return the newest reading."""
 
     def zero_force_sensor(self) -> None:
-        """Take the present force as zero; the tool must touch nothing."""
+        """Zero the force sensor at the present force; the tool must touch nothing."""
 
     def press(self, frame: Array, newtons: float) -> None:
         """Become compliant along the z axis of a frame (6,) and press down."""
 
     def follow(self, pose: Array, seconds: float) -> bool:
-        """Follow a pose (6,) until the next one ``seconds`` later; False if refused."""
+        """Follow a pose (6,) until the next one ``seconds`` later.
+
+        Return False if the controller rejects it.
+        """
 
     def release(self, pose: Array) -> None:
         """End compliance and hold a pose (6,)."""
@@ -61,7 +65,7 @@ class Arm(Protocol):
         """Brake to rest and end compliance."""
 
     def unlock(self) -> str:
-        """Release a protective stop; return "" or why that is refused."""
+        """Release a protective stop; return "", or the reason of a failure."""
 
     def close(self) -> None:
-        """Halt, if it still obeys, and disconnect."""
+        """Halt the arm if it still responds, and disconnect."""

@@ -1,10 +1,11 @@
-"""Arm driver: the process between commands and an arm, 125 times a second.
+"""Robot client: the 125 Hz loop between commands and an arm.
 
-It takes commanded velocities from a mailbox and sends the arm shaped poses. It brakes
-when a command is older than 0.15 s, when its caller is gone, when the paddle leaves the
-table's plane or does not follow, and when it is late itself; it stops for good when the
-arm is silent or has stopped (`supervisor.Supervisor`). It never recovers without an
-operator's word, and never from an emergency stop.
+It reads commanded velocities from shared memory and sends shaped poses to the arm. It
+brakes when a command is older than 0.15 s, when its caller has ended, when the paddle
+leaves the table's plane or does not follow, and when the robot client itself is late.
+When the arm is silent or has stopped, it stops and remains stopped
+(`supervisor.Supervisor`). It never recovers without the confirmation of an operator,
+and never from an emergency stop.
 """
 
 from __future__ import annotations
@@ -37,25 +38,25 @@ from marl_airhockey.sim.core.geometry import half_planes
 from marl_airhockey.types import Array
 
 RATE = 125.0
-"""Cycles a second"""
+"""Number of cycles per second."""
 OVERRUN = 0.1
-"""Delay of a cycle after which the paddle brakes, s"""
+"""Delay of a cycle after which the paddle brakes, s."""
 NEW_PROCESS = (Fault.ROBOT_SILENT, Fault.CONNECTION_LOST)
-"""Faults after which a driver ends and must be started again: its client would connect
-and send its script again for ever"""
+"""Faults after which the robot client ends and must be started again, because ur-rtde
+would reconnect and send its script forever."""
 MISALIGNED = 0.05
-"""Angle between the tool and its orientation on the table at which an arm is not at
-the table, rad"""
+"""Angle between the tool and its orientation on the table above which an arm is not at
+the table, rad."""
 
 
 class ArmDriver:
-    """Driver of one arm.
+    """Robot client of one arm.
 
     Args:
-        config: Configuration.
-        arm: Arm that it moves.
-        box: Mailbox of requests and observations.
-        clock: Function that returns the time, s; another one emulates time.
+        config: Configuration of the robot.
+        arm: Arm that is moved.
+        box: Shared memory of requests and observations.
+        clock: Function that returns the time, s. A different one emulates time.
     """
 
     def __init__(
@@ -78,15 +79,15 @@ class ArmDriver:
         if not self._at_table(reading):
             self.supervisor.fail(self._due, Fault.NOT_AT_TABLE)
         elif reading.fault is ArmFault.NONE and position[2] > LIFTED:
-            # Only in free air: on the table the contact's force would count as none.
+            # Only in free air: on the table, the contact force would be taken as zero.
             arm.zero_force_sensor()
 
     def _position(self, reading: Reading) -> Array:
-        """Return (3,) the paddle, table frame, m."""
+        """Return the position (3,) of the paddle, table frame, m."""
         return self._config.mounting.to_table(reading.pose)
 
     def _at_table(self, reading: Reading) -> bool:
-        """Return True if the paddle is over the reach or on it, in its orientation."""
+        """Return True for a paddle on or above the workspace, in its orientation."""
         *place, height = self._position(reading)
         corners = tuple((float(x), float(y)) for x, y in self._config.reach)
         normals, offsets = half_planes(corners)
@@ -96,7 +97,7 @@ class ArmDriver:
 
     @property
     def is_over(self) -> bool:
-        """True after a fault for which a new driver must be started."""
+        """True after a fault that requires a new robot client."""
         rests = (
             self._motion.shaper.at_rest
             or self.supervisor.fault is Fault.CONNECTION_LOST
@@ -111,14 +112,14 @@ class ArmDriver:
             time.sleep(left)
             return
         if left < -0.5 * self._dt:
-            # What was missed is not made up for: poses in a hurry are a leap.
+            # Missed cycles are skipped: poses in quick succession would be a leap.
             self._late += 1
             self._due = self._clock()
         if left < -OVERRUN:
             self.supervisor.hold(self._clock(), Fault.DRIVER_LATE)
 
     def cycle(self) -> None:
-        """Read the arm, decide, move the paddle, and publish an observation."""
+        """Read the arm, update the state, move the paddle, publish an observation."""
         now, reading = self._clock(), self._arm.read()
         request, supervisor = self._box.request, self.supervisor
         position, before = self._position(reading), supervisor.state
@@ -145,17 +146,17 @@ class ArmDriver:
         elif request.recover > self._recovered:
             self._recovered = request.recover
             self._recover(now)
-            # That takes half a second.
+            # A recovery takes half a second.
             now, reading = self._clock(), self._arm.read()
         elif supervisor.fault is Fault.ROBOT_SILENT and measured.moving:
-            # It may still hear: braking is better than a pose that stands still.
+            # The robot may still receive poses: braking is better than a constant pose.
             self._motion.brake()
             self._send(now)
         self._cycles += 1
         self._publish(now, reading)
 
     def _move(self, now: float, request: Request) -> None:
-        """Move the paddle, pressed on the table, as the request says."""
+        """Move the paddle, pressed on the table, as requested."""
         size = math.hypot(request.vx, request.vy)
         finite = math.isfinite(size) and math.isfinite(request.seconds)
         if request.stamp != self._seen:
@@ -172,7 +173,7 @@ class ArmDriver:
         self._send(now)
 
     def _come_to_rest(self, now: float, reading: Reading, position: Array) -> None:
-        """Brake in the table's plane, then hold the paddle's height, too."""
+        """Brake in the table's plane, then also hold the height of the paddle."""
         self._motion.come_to_rest(reading, position)
         self._send(now)
         if self.supervisor.pressed_at and self._motion.shaper.at_rest:
@@ -189,13 +190,13 @@ class ArmDriver:
             self.supervisor.fail(now, Fault.PROGRAM_LOST if lost else Fault(fault))
 
     def _recover(self, now: float) -> None:
-        """Recover from a stop, on an operator's word; never from an emergency stop."""
+        """Recover from a stop after a confirmation; never from an emergency stop."""
         fault, reading = self.supervisor.fault, self._arm.read()
         emergency = reading.fault is ArmFault.EMERGENCY_STOP
         if emergency or fault is Fault.EMERGENCY_STOP or fault in NEW_PROCESS:
             return
         if self.supervisor.silent(now):
-            # Its client may be beyond repair; the caller starts a new process.
+            # The connection may be unusable; the caller starts a new process.
             return
         stopped = reading.fault is not ArmFault.NONE
         if not self._at_table(reading) or (stopped and self._arm.unlock()):
@@ -241,7 +242,7 @@ class ArmDriver:
         )
 
     def close(self) -> None:
-        """Brake, as far as the arm still follows, and report that the driver ends."""
+        """Brake as far as the arm still follows, and report the end."""
         until = self._clock() + 1.0
         while (
             self.supervisor.state is not DriverState.FAULT

@@ -1,9 +1,9 @@
-"""Filters of commands: what smooths a policy's velocities before the shaper.
+"""Filters that smooth the velocities of a policy before the shaper.
 
-A policy commands a new velocity in every control step, 20 times a second; a filter says
-which velocity the shaper is to reach, and when, in each of the driver's cycles. The
-shaper's limits hold whatever comes out here. `scripts/reproduce/smoothing.py` compares
-the filters.
+A policy commands a new velocity in every control step, 20 times a second. In each cycle
+of the robot client, a filter returns the velocity that the shaper has to reach, and the
+time until then. The limits of the shaper apply to any output of a filter.
+`scripts/reproduce/smoothing.py` compares the filters.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ class Target(NamedTuple):
     """Target of the shaper."""
 
     velocity: Array
-    """(2,) m/s"""
+    """Velocity (2,), m/s."""
     seconds: float
-    """Time in which it is to be reached by a linear ramp, s; 0 for immediately"""
+    """Time of a linear ramp to the velocity, s; 0 for immediately."""
 
 
 class Filter(Protocol):
@@ -35,16 +35,16 @@ class Filter(Protocol):
         """Return the target of a cycle.
 
         Args:
-            velocity: (2,) commanded velocity, m/s, finite.
-            left: Time until the command is to be reached, s.
+            velocity: Commanded velocity (2,), m/s, finite.
+            left: Time until the commanded velocity has to be reached, s.
         """
 
     def reset(self, velocity: Array) -> None:
-        """Begin at a velocity (2,), m/s, with no acceleration."""
+        """Restart at a velocity (2,), m/s, without acceleration."""
 
 
 class NoFilter:
-    """Filter that passes commands on: a linear ramp over the control step.
+    """Filter that does not change commands: a linear ramp over the control step.
 
     Args:
         dt: Time of a cycle, s.
@@ -52,17 +52,17 @@ class NoFilter:
     """
 
     def __init__(self, dt: float, time: float) -> None:
-        """Keep nothing."""
+        """Do nothing."""
 
     def reset(self, velocity: Array) -> None:
-        """Keep nothing."""
+        """Do nothing."""
 
     def step(self, velocity: Array, left: float) -> Target:
         return Target(velocity, left)
 
 
 class LowPass:
-    """First-order low pass.
+    """First-order low-pass filter.
 
     Args:
         dt: Time of a cycle, s.
@@ -90,7 +90,7 @@ class JerkLimited:
     """
 
     ACCELERATION = 7.0
-    """Largest acceleration, m/s2"""
+    """Largest acceleration, m/s2."""
 
     def __init__(self, dt: float, time: float) -> None:
         self._dt, self._jerk = dt, self.ACCELERATION / max(time, dt)
@@ -102,7 +102,7 @@ class JerkLimited:
     def step(self, velocity: Array, left: float) -> Target:
         change = velocity - self._velocity
         size = float(np.linalg.norm(change))
-        # The acceleration from which the jerk ends just at the command, in cycles.
+        # Acceleration from which the limited jerk ends exactly at the command.
         brake = self._jerk * self._dt
         most = 0.5 * (np.sqrt(brake**2 + 8.0 * self._jerk * size) - brake)
         pull = change / max(size, 1e-9) * min(self.ACCELERATION, most, size / self._dt)
@@ -118,9 +118,10 @@ class JerkLimited:
 class MinimumJerk:
     """Filter that reaches each command with the least integral of the squared jerk.
 
-    From a velocity and an acceleration to the commanded velocity without acceleration
-    that is a cubic polynomial of time, over the rest of the control step and ``time``.
-    As each command plans anew, a step is passed by up to 2 % before it is reached.
+    The velocity is a cubic polynomial of time. It begins with the present velocity and
+    acceleration and ends at the commanded velocity without acceleration. It lasts for
+    the rest of the control step plus ``time``. Each command starts a new polynomial, so
+    a step response overshoots by up to 2 %.
 
     Args:
         dt: Time of a cycle, s.
@@ -152,7 +153,7 @@ FILTERS: dict[str, Callable[[float, float], Filter]] = {
     "jerk_limited": JerkLimited,
     "minimum_jerk": MinimumJerk,
 }
-"""Filters by name"""
+"""Filters by name."""
 
 
 @dataclass(frozen=True)
@@ -160,13 +161,13 @@ class Smoothing:
     """Choice of a filter.
 
     Raises:
-        ValueError: An unknown name, or a time that is not 0 to 1 s.
+        ValueError: The name is unknown, or the time is outside 0 to 1 s.
     """
 
     name: str = "none"
-    """Name of one of `FILTERS`"""
+    """Name of the filter, a key of `FILTERS`."""
     time: float = 0.05
-    """Its time, s"""
+    """Time of the filter, s."""
 
     def __post_init__(self) -> None:
         check_fields(self, time=(0.0, 1.0))

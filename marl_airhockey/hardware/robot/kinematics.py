@@ -1,8 +1,8 @@
 """Kinematics of a UR5e: poses of the flange from joint angles, and back.
 
-Angles are rad, lengths m; rotations are matrices, or rotation vectors as the
-controller's protocol has them. Denavit-Hartenberg parameters: the maker's, published
-for the UR5e.
+Angles are in rad, lengths in m. Rotations are matrices, or rotation vectors as in the
+controller's protocol. The Denavit-Hartenberg parameters are those that the maker has
+published for the UR5e.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from marl_airhockey.types import Array
 
 JOINTS = 6
 LENGTH = np.array([0.0, -0.425, -0.3922, 0.0, 0.0, 0.0])
-"""Parameters a, m"""
+"""Denavit-Hartenberg parameters a, m."""
 OFFSET = np.array([0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996])
-"""Parameters d, m"""
+"""Denavit-Hartenberg parameters d, m."""
 TWIST = np.array([np.pi / 2, 0.0, 0.0, np.pi / 2, -np.pi / 2, 0.0])
-"""Parameters alpha, rad"""
+"""Denavit-Hartenberg parameters alpha, rad."""
 TOLERANCE = 1e-8
-"""Largest norm of the error of an inverse, in m and rad together"""
+"""Largest norm of the error of an inverse solution, m and rad combined."""
 DAMPING = 1e-7
-"""Damping of the inverse, so that it stays bounded at a singular pose"""
+"""Damping of the inverse, which keeps it bounded at a singular pose."""
 
 
 @compiled()
@@ -55,7 +55,8 @@ def inverse(pose: Array, guess: Array, iterations: int = 30) -> tuple[bool, Arra
     """Find the joint angles of a pose (4, 4) that are near a guess (6,).
 
     Returns:
-        Whether there are any, and the angles, the last that were tried if not.
+        True if there are such angles, and the angles (6,), rad, or the last that were
+        tried.
     """
     angles = guess.copy()
     error = np.empty(6)
@@ -118,7 +119,7 @@ def vector_of(matrix: Array) -> Array:
         ]
     )
     if np.pi - angle < 1e-5:
-        # Half a turn: the axis from the symmetric part, its sign from what is left.
+        # Half a turn: the symmetric part gives the axis, the rest gives its sign.
         square = (matrix + np.eye(3)) / 2.0
         k = int(np.argmax(np.diag(square)))
         found = square[:, k] / np.sqrt(square[k, k])
@@ -131,12 +132,12 @@ def vector_of(matrix: Array) -> Array:
 
 
 def pose_of(vector: Array) -> Array:
-    """Return the pose (4, 4) of (6,): a position, m, and a rotation vector, rad."""
+    """Return the pose (4, 4) of a position, m, and a rotation vector, rad (6,)."""
     pose = np.eye(4)
     pose[:3, 3], pose[:3, :3] = vector[:3], matrix_of(np.asarray(vector[3:]))
     return pose
 
 
 def pose_vector(pose: Array) -> Array:
-    """Return (6,) position and rotation vector of a pose (4, 4)."""
+    """Return the position, m, and rotation vector, rad (6,), of a pose (4, 4)."""
     return np.concatenate([pose[:3, 3], vector_of(np.ascontiguousarray(pose[:3, :3]))])

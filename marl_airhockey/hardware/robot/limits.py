@@ -1,7 +1,7 @@
-"""Limits of an arm's joints, read from its controller, and a check of a table's reach.
+"""Limits of an arm's joints, read from its controller, and a check of the workspace.
 
-The controller's state has the limits of the joints, but not the safety limits of the
-tool (speed and force). A person reads those from the pendant.
+The controller's state contains the limits of the joints, but not the safety limits of
+the tool (speed and force). A person reads these from the pendant.
 """
 
 from __future__ import annotations
@@ -25,32 +25,33 @@ from marl_airhockey.sim.core.geometry import half_planes
 from marl_airhockey.types import Array
 
 STATE_PORT = 30012
-"""Read-only port of a controller's state"""
+"""Read-only port of a controller's state."""
 STATE, JOINT_DATA, CONFIGURATION = 16, 1, 6
-"""Numbers of a message and of two of its packages, see the maker's documentation"""
+"""Numbers of a message and of two of its packages, from the maker's documentation."""
 JOINT = struct.Struct(">3d4fB")
-"""Joint in its package; the first number is its angle, rad"""
+"""Format of a joint in its package; the first number is the angle, rad."""
 BOUNDS = struct.Struct(f">{4 * JOINTS}d")
-"""Least and largest angle of each joint, then its largest speed and acceleration"""
+"""Format of the least and largest angles of all joints, then of their largest speeds
+and accelerations."""
 ANSWER = 3.0
-"""Longest time until a controller sends its state, s"""
+"""Longest time until a controller sends its state, s."""
 SHARE = 0.95
-"""Largest share of a joint's speed limit that motion in the reach may need"""
+"""Largest share of a joint's speed limit that motion in the workspace may need."""
 SPACING = 9
-"""Number of checked positions along each side of the reach"""
+"""Number of checked positions along each side of the workspace."""
 
 
 class JointLimits(NamedTuple):
     """Limits of the joints and their present angles."""
 
     least: Array
-    """(6,) least angles, rad"""
+    """Least angles (6,), rad."""
     most: Array
-    """(6,) largest angles, rad"""
+    """Largest angles (6,), rad."""
     speed: Array
-    """(6,) largest speeds, rad/s"""
+    """Largest speeds (6,), rad/s."""
     angles: Array
-    """(6,) present angles, rad"""
+    """Present angles (6,), rad."""
 
 
 def read_limits(host: str, port: int = STATE_PORT) -> JointLimits:
@@ -61,7 +62,7 @@ def read_limits(host: str, port: int = STATE_PORT) -> JointLimits:
         port: Port that sends the controller's state.
 
     Raises:
-        OSError: No controller answers, or it reports no limits.
+        OSError: No controller responds, or it reports no limits.
     """
     with socket.create_connection((host, port), ANSWER) as link:
         link.settimeout(ANSWER)
@@ -73,13 +74,13 @@ def read_limits(host: str, port: int = STATE_PORT) -> JointLimits:
             packages = _packages(body) if kind == STATE else {}
             if {JOINT_DATA, CONFIGURATION} <= packages.keys():
                 return _limits(packages)
-    raise OSError(f"the controller at {host} tells no limits of its joints")
+    raise OSError(f"the controller at {host} reports no joint limits")
 
 
 def _exactly(read: Callable[[int], bytes], count: int) -> bytes:
     data = read(count)
     if len(data) < count:
-        raise OSError("the controller has hung up")
+        raise OSError("the controller closed the connection")
     return data
 
 
@@ -105,17 +106,18 @@ def _limits(packages: dict[int, bytes]) -> JointLimits:
 def check_reach(
     limits: JointLimits, mounting: Mounting, tool: Array, reach: Array, speed: float
 ) -> None:
-    """Refuse a reach in which an arm would exceed the limits of its joints.
+    """Check that an arm stays within its joint limits in the whole workspace.
 
     Args:
         limits: Limits of the arm's joints.
         mounting: Mounting of the table.
-        tool: (6,) pose of the paddle's foot, flange frame, m and rad.
-        reach: (n, 2) polygon of the paddle's centre, table frame, m.
+        tool: Pose (6,) of the paddle's foot, flange frame, m and rad.
+        reach: Workspace, a polygon (n, 2) of the paddle's centre, table frame, m.
         speed: Top speed of the paddle, in any direction, m/s.
 
     Raises:
-        ValueError: A joint exceeds its limits; the message names where.
+        ValueError: The arm does not reach a position, or a joint exceeds its limits
+            there. The message gives the position.
     """
     flange_of = np.linalg.inv(pose_of(tool))
     angles, rotation = limits.angles, np.array(mounting.rotation)
@@ -125,7 +127,7 @@ def check_reach(
         where = f"with the paddle at x {place[0]:+.2f}, y {place[1]:+.2f} m"
         if not there:
             raise ValueError(
-                f"robot: it does not reach the table {where}: is the mounting right?"
+                f"robot: the arm does not reach the table {where}; check the mounting"
             )
         beyond = (angles < limits.least) | (angles > limits.most)
         if beyond.any():
@@ -143,13 +145,13 @@ def check_reach(
         if share.max() > SHARE:
             raise ValueError(
                 f"robot: {where} joint {int(share.argmax())} needs {share.max():.0%} "
-                f"of the speed it may have for {speed} m/s; lower limits.speed, or "
+                f"of its speed limit for {speed} m/s; lower limits.speed, or "
                 "mount the table nearer"
             )
 
 
 def _places(reach: Array) -> Array:
-    """Return positions (m, 2) in a polygon (n, 2), each near the one before."""
+    """Return positions (m, 2) in a polygon (n, 2), each near the previous one."""
     low, high = reach.min(0), reach.max(0)
     lines = [
         np.column_stack([np.full(SPACING, x), np.linspace(low[1], high[1], SPACING)])

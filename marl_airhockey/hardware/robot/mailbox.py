@@ -1,6 +1,6 @@
-"""Mailbox: memory that a robot's driver shares with its caller.
+"""Shared memory of the robot client and its caller.
 
-Nobody waits for a lock, see `block.Block`.
+It has no lock, see `block.Block`.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from marl_airhockey.hardware.robot.arm import ArmFault
 from marl_airhockey.types import Array
 
 JOINT_NAMES = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
-"""Names of the joints, in their order"""
+"""Names of the joints, from the base to the last wrist."""
 TRACK = 128
-"""Number of positions of the paddle that are kept"""
+"""Number of stored positions of the paddle."""
 LOG = 32
-"""Number of changes of the state that are kept"""
+"""Number of stored changes of the state."""
 
 
 class DriverState(IntEnum):
-    """State of a robot's driver, see `supervisor`."""
+    """State of the robot client, see `supervisor`."""
 
     STARTING = 0
     READY = 1
@@ -56,53 +56,53 @@ class Fault(IntEnum):
 
     @property
     def label(self) -> str:
-        """Name for messages."""
+        """Name of the fault in messages."""
         return self.name.lower().replace("_", " ")
 
 
 class RobotObservation(NamedTuple):
-    """Observation of a driver and its arm, table frame, m, m/s and s."""
+    """Observation of the robot client and its arm, table frame, m, m/s and s."""
 
     state: int
-    """`DriverState`"""
+    """Number of the `DriverState`."""
     fault: int
-    """`Fault`: reason of the state"""
+    """Number of the `Fault`, the reason of the state."""
     stamp: float
-    """Time of this observation, of the monotonic clock"""
+    """Time of this observation, monotonic clock."""
     robot_time: float
-    """Time of the reading, of the robot's clock"""
+    """Time of the reading of the arm, robot's clock."""
     x: float
     y: float
     z: float
-    """Height of the paddle above the table's plane"""
+    """Height of the paddle above the table's plane."""
     vx: float
     vy: float
     sent_x: float
-    """Position that the arm was sent to last"""
+    """Last position that was sent to the arm."""
     sent_y: float
     sent_vx: float
     sent_vy: float
     force: float
-    """Force of the table on the paddle, along the table's normal, N"""
+    """Force of the table on the paddle, along the table's normal, N."""
     base: float
-    """Angle of the first joint, rad; those of the others follow"""
+    """Angle of the first joint, rad; the next five fields are those of the others."""
     shoulder: float
     elbow: float
     wrist_1: float
     wrist_2: float
     wrist_3: float
     misalignment: float
-    """Angle between the tool and its orientation on the table, rad"""
+    """Angle between the tool and its orientation on the table, rad."""
     speed_scaling: float
-    """Fraction of the speed limit that the speed slider leaves"""
+    """Fraction of the speed limit that is in use, at most that of the speed slider."""
     cycles: int
-    """Number of cycles of the driver"""
+    """Number of cycles so far."""
     late: int
-    """Number of those that began more than half a period late"""
+    """Number of cycles that began more than half a period late."""
     refused: int
-    """Number of commands that were not finite"""
+    """Number of commands that were not finite."""
     braked_at: float
-    """Time at which braking began last, of the monotonic clock"""
+    """Time at which braking last began, monotonic clock."""
 
     @property
     def joints(self) -> tuple[float, ...]:
@@ -111,41 +111,41 @@ class RobotObservation(NamedTuple):
 
     @classmethod
     def of_fault(cls, fault: Fault) -> Self:
-        """Return the observation of a driver that has no arm, all else 0."""
+        """Return the observation of a robot client without an arm; the rest is 0."""
         blank = [0.0] * len(cls._fields)
         blank[:2] = float(DriverState.FAULT), float(fault)
         return cls._make(blank)
 
 
 class StateChange(NamedTuple):
-    """Change of a driver's state."""
+    """Change of the state of the robot client."""
 
     time: float
-    """Time of the monotonic clock, s"""
+    """Time of the change, monotonic clock, s."""
     state: DriverState
     fault: Fault
-    """Reason"""
+    """Reason of the change."""
 
 
 class Request(NamedTuple):
-    """Request of a caller to the driver."""
+    """Request of a caller to the robot client."""
 
     vx: float
     vy: float
     seconds: float
-    """Time in which the velocity is to be reached, and after which it continues"""
+    """Time of a linear ramp to the velocity, s; afterwards it is constant."""
     stamp: float
-    """Time of the command, of the monotonic clock"""
+    """Time of the command, monotonic clock, s."""
     enabled: float
-    """1 while somebody holds the driver enabled"""
+    """1 while the caller enables the robot."""
     recover: float
-    """Number of recoveries that an operator has requested"""
+    """Number of recoveries that an operator has requested."""
     closing: float
-    """1 when the driver is to end"""
+    """1 to end the robot client."""
 
 
 class Mailbox:
-    """Mailbox between a driver and its caller.
+    """Shared memory between the robot client and its caller.
 
     Args:
         memory: Shared array, see `allocate`.
@@ -159,7 +159,7 @@ class Mailbox:
 
     @staticmethod
     def allocate() -> Any:
-        """Return the memory of a mailbox, which processes can inherit."""
+        """Allocate memory that processes can inherit."""
         context = multiprocessing.get_context("spawn")
         total = sum(_SIZES) + len(_SIZES)
         return context.Array(ctypes.c_double, total, lock=False)
@@ -175,7 +175,7 @@ class Mailbox:
 
     @property
     def observation(self) -> RobotObservation:
-        """Newest observation of the driver."""
+        """Newest observation of the robot client."""
         return RobotObservation(*self._observation.read().tolist())
 
     @observation.setter
@@ -184,7 +184,7 @@ class Mailbox:
 
     @property
     def track(self) -> Array:
-        """(TRACK, 3) time, s, x and y, m, of the paddle, the newest last."""
+        """Time, s, and x and y, m, of the paddle (TRACK, 3), the newest last."""
         return self._track.read().reshape(TRACK, 3)
 
     @track.setter
@@ -210,4 +210,4 @@ class Mailbox:
 
 
 _SIZES = (len(Request._fields), len(RobotObservation._fields), 3 * TRACK, 3 * LOG)
-"""Numbers in each part of a mailbox"""
+"""Number of values in each part of the shared memory."""

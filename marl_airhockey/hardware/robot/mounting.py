@@ -1,4 +1,4 @@
-"""Mounting: pose of a table in the base frame of a robot."""
+"""Pose of a table in the base frame of a robot."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from marl_airhockey.sim.core.checks import check_fields
 from marl_airhockey.types import Array
 
 FULL_ROTATION = 2.0 * np.pi
-"""Largest component of a rotation vector, rad"""
+"""Largest component of a rotation vector, rad."""
 STEEP = 45.0
-"""Largest angle between the table's normal and the z axis of the base, deg"""
+"""Largest angle between the table's normal and the z axis of the base, deg."""
 OBLIQUE = 10.0
-"""Largest angle between the tool's z axis and the way into the table, deg"""
+"""Largest angle between the tool's z axis and the direction into the table, deg."""
 
 
 @dataclass(frozen=True)
@@ -25,20 +25,20 @@ class Mounting:
     """Pose of the table and orientation of the tool, base frame of a robot.
 
     Raises:
-        ValueError: The rotation is none, the table does not face up, or the tool does
-            not point into the table.
+        ValueError: The matrix is not a rotation, the table does not face up, or the
+            tool does not point into the table.
     """
 
     origin: tuple[float, float, float]
-    """Table's centre, base frame, m"""
+    """Centre of the table, base frame, m."""
     rotation: tuple[tuple[float, float, float], ...]
-    """(3, 3) rotation from the table frame to the base frame"""
+    """Rotation (3, 3) from the table frame to the base frame."""
     tool: tuple[float, float, float]
-    """Rotation vector of the tool on the table, base frame, rad"""
+    """Rotation vector of the tool on the table, base frame, rad."""
     residual: float = 0.0
-    """Root mean square error of the fit, m"""
+    """Root mean square error of the fit, m."""
     points: int = 0
-    """Number of points of the fit"""
+    """Number of points of the fit."""
 
     def __post_init__(self) -> None:
         check_fields(
@@ -55,7 +55,7 @@ class Mounting:
         return np.array(self.rotation, float)
 
     def _check_handedness(self) -> None:
-        """Refuse a mirrored or upside-down table, and a tool that is not above it."""
+        """Check that the table is not mirrored, faces up, and has the tool above it."""
         rotation = self._rotation
         off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
         if off > 1e-3 or np.linalg.det(rotation) < 0.0:
@@ -73,7 +73,7 @@ class Mounting:
         off = np.degrees(np.arccos(np.clip(-into @ rotation[:, 2], -1.0, 1.0)))
         if off > OBLIQUE:
             raise ValueError(
-                f"tool: its z is {off:.0f} deg away from the way into the table; "
+                f"tool: its z is {off:.0f} deg away from the direction into the table; "
                 f"expected at most {OBLIQUE:.0f}"
             )
 
@@ -86,7 +86,7 @@ class Mounting:
         residual: float = 0.0,
         points: int = 0,
     ) -> Self:
-        """Return a mounting with the arrays (3,), (3, 3) and (3,) as tuples."""
+        """Return a mounting from arrays of shape (3,), (3, 3) and (3,)."""
         x, y, z = origin.tolist()
         a, b, c = tool.tolist()
         rows = tuple(tuple(row) for row in rotation.tolist())
@@ -101,7 +101,7 @@ class Mounting:
         """Return the pose (6,), base frame, of a tool above the table, m and rad.
 
         Args:
-            place: (2,) position, table frame, m.
+            place: Position (2,), table frame, m.
             height: Height above the table, m.
         """
         point = self._origin + self._rotation @ (place[0], place[1], height)
@@ -131,30 +131,30 @@ def fit_mounting(points: Array, touched: Array, tool: Array) -> Mounting:
     """Fit a mounting to points that a tool has touched.
 
     Args:
-        points: (n, 2) points on the table, table frame, m; at least 3, not in a line.
-        touched: (n, 3) tool centre at these points, base frame, m.
-        tool: (3,) rotation vector of the tool, base frame, rad.
+        points: Points (n, 2) on the table, table frame, m; at least 3, not collinear.
+        touched: Positions (n, 3) of the tool centre at these points, base frame, m.
+        tool: Rotation vector (3,) of the tool, base frame, rad.
 
     Raises:
-        ValueError: Too few points, all in a line, or mirrored: the tool would touch the
-            table from below.
+        ValueError: There are too few points, they are collinear, or they are mirrored,
+            so that the tool would touch the table from below.
     """
     points, touched = np.asarray(points, float), np.asarray(touched, float)
     if len(points) < 3 or len(points) != len(touched):
-        raise ValueError(f"{len(points)} points: a mounting takes at least 3 pairs")
+        raise ValueError(f"{len(points)} points; a mounting needs at least 3 pairs")
     flat = np.column_stack([points, np.zeros(len(points))])
     middle, base = flat.mean(0), touched.mean(0)
     u, size, vt = np.linalg.svd((touched - base).T @ (flat - middle))
     if size[1] < 1e-3 * max(size[0], 1e-12):
-        raise ValueError("all points lie in a line: touch some beside it")
+        raise ValueError("all points lie in a line; touch some next to it")
     sign = np.diag([1.0, 1.0, np.linalg.det(u @ vt)])
     rotation = u @ sign @ vt
     into = matrix_of(np.asarray(tool, float))[:, 2]
     if rotation[:, 2] @ into > 0.0:
         raise ValueError(
             "the points are mirrored: the tool would touch the table from below; is "
-            "the camera's picture flipped, were the corners clicked in the other "
-            "direction, or is y counted the other way?"
+            "the camera's image flipped, were the corners clicked in the opposite "
+            "direction, or does y have the wrong sign?"
         )
     origin = base - rotation @ middle
     off = touched - (origin + flat @ rotation.T)

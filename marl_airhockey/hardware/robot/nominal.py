@@ -1,4 +1,4 @@
-"""Nominal mounting: how the arm of the emulator stands at its table."""
+"""Nominal mounting of the emulated arm at its table."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from marl_airhockey.sim.core.seat import Seat, make_seat
 from marl_airhockey.sim.core.table import TABLES, Table
 
 BEHIND = 0.22
-"""Distance of the arm's base from the table's edge, m"""
+"""Distance of the arm's base from the table's edge, m."""
 BELOW = 0.02
-"""Height of that edge above the base, m"""
+"""Height of the table's edge above the base, m."""
 TILT = 5.5
-"""Tilt of the table, deg"""
+"""Tilt of the table, deg."""
 
 
 def nominal_mounting(table: Table, tilt: float = TILT) -> Mounting:
-    """Return where a table lies in the base frame of the arm at its home side.
+    """Return the pose of a table in the base frame of the arm at its home side.
 
     Args:
-        table: Table; all of them share the home edge.
-        tilt: Its tilt, deg.
+        table: Table. The home edge is the same for all tables.
+        tilt: Tilt of the table, deg.
     """
     c, s = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
     rotation = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
@@ -34,15 +34,15 @@ def nominal_mounting(table: Table, tilt: float = TILT) -> Mounting:
 
 
 def table_of(seat: Seat) -> Table:
-    """Return the preset table whose robot seat has the reach of a seat.
+    """Return the preset table whose robot seat has the workspace of a seat.
 
     Raises:
-        ValueError: There is none: the seat is no robot's.
+        ValueError: There is none, as the seat is not that of a robot.
     """
     for table in TABLES.values():
         if make_seat("robot", table, 0).reach == seat.reach:
             return table
     raise ValueError(
-        "ur5e: this seat is no robot's; play a single-agent task, or a game with "
-        "--option seats=robot"
+        "ur5e: this is not the seat of a robot; choose a task with one agent, or a "
+        "game with --option seats=robot"
     )

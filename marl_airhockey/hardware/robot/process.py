@@ -1,4 +1,4 @@
-"""Process of a robot's driver."""
+"""Process of the robot client."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from marl_airhockey.hardware.robot.rehearsal import rehearse
 
 
 def run_driver(config: RobotConfig, memory: Any) -> None:
-    """Run until the mailbox says closing, the parent process is gone or the arm lost.
+    """Run until the caller requests the end, or the parent process or the arm is lost.
 
     Args:
-        config: Configuration of the driver.
-        memory: Memory of its mailbox.
+        config: Configuration of the robot.
+        memory: Shared memory, see `Mailbox.allocate`.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     raise_priority()
@@ -36,7 +36,7 @@ def run_driver(config: RobotConfig, memory: Any) -> None:
         while not box.request.closing and os.getppid() == parent:
             driver.cycle()
             if driver.is_over:
-                # The client's threads would go on, and abort in their own way.
+                # The threads of ur-rtde would continue, and abort the process later.
                 os._exit(1)
             driver.wait()
         driver.close()

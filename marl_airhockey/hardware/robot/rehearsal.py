@@ -1,7 +1,7 @@
-"""Rehearsal of a driver: what is slow once is done before an arm is connected.
+"""Warm-up of a robot client before an arm is connected.
 
-The controller ends a program whose client is silent for 0.1 s, and the first calls of
-compiled code and the first imports take longer.
+The controller ends a control script whose client is silent for 0.1 s. The first calls
+of compiled code and the first imports take longer.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from marl_airhockey.hardware.robot.mailbox import Mailbox, Request
 from marl_airhockey.types import Array
 
 CYCLES = 40
-"""Cycles of each part"""
+"""Number of cycles of each part."""
 
 
 class RehearsedArm:
-    """Arm that is always where it was sent.
+    """Simulated arm that is always at the pose that it was sent.
 
     Args:
-        pose: (6,) its pose, base frame, m and rad.
+        pose: Initial pose (6,), base frame, m and rad.
     """
 
     def __init__(self, pose: Array) -> None:
         self.now = 0.0
-        """Time, s"""
+        """Time, s."""
         self._pose = pose
 
     def read(self) -> Reading:
@@ -61,10 +61,10 @@ class RehearsedArm:
 
 
 def rehearse(config: RobotConfig) -> None:
-    """Run a driver through its states with an arm that is none.
+    """Run a robot client through its states with a simulated arm.
 
     Args:
-        config: Configuration of the driver.
+        config: Configuration of the robot.
     """
     place, box = np.mean(config.reach, 0), Mailbox(Mailbox.allocate())
     arm = RehearsedArm(config.mounting.pose(place))

@@ -1,4 +1,4 @@
-"""Robot: a paddle that an arm moves, as the rest of the library commands it."""
+"""Robot: interface of a paddle that an arm moves."""
 
 from __future__ import annotations
 
@@ -33,34 +33,34 @@ from marl_airhockey.hardware.robot.start import (
 from marl_airhockey.types import Array
 
 START = 30.0
-"""Longest time until a driver has connected, s"""
+"""Longest time until the robot client has connected, s."""
 RECOVERY = 3.0
-"""Longest time that a recovery takes, s"""
+"""Longest time of a recovery, s."""
 SILENT = 0.3
-"""Time without news from the driver's process after which it counts as gone, s"""
+"""Time without an observation after which the robot client counts as ended, s."""
 SLOW = 0.25
-"""Speed at which a paddle is moved to a position, m/s"""
+"""Speed at which a paddle is moved to a position, m/s."""
 NEAR = 0.004
-"""Distance from a position that counts as there, m"""
+"""Distance from a position below which the paddle counts as arrived, m."""
 
 
 class Robot:
-    """Robot whose driver runs in a process of its own.
+    """Robot with a robot client in a separate process.
 
-    Its life is that of a LeRobot device: `connect`, `get_observation`, `send_action`,
-    `disconnect`, or a ``with`` block. In addition it moves only while it is enabled,
-    and brakes when commands fail to come.
+    Its methods are those of a LeRobot device: `connect`, `get_observation`,
+    `send_action` and `disconnect`, or a ``with`` block. In addition, it moves only
+    while it is enabled, and brakes when commands do not arrive.
 
     Args:
-        config: Configuration.
+        config: Configuration of the robot.
     """
 
     observation_features: ClassVar[Mapping[str, type]] = dict.fromkeys(
         RobotObservation._fields, float
     )
-    """Names and types of what `get_observation` returns"""
+    """Names and types of the fields of an observation."""
     action_features: ClassVar[Mapping[str, type]] = {"vx": float, "vy": float}
-    """Names and types of an action: a velocity, table frame, m/s"""
+    """Names and types of an action: a velocity, table frame, m/s."""
 
     def __init__(self, config: RobotConfig) -> None:
         self.config = config
@@ -82,14 +82,14 @@ class Robot:
         self.disconnect()
 
     def connect(self) -> None:
-        """Start the driver and wait until the arm answers; nothing moves.
+        """Start the robot client and wait until the arm responds; nothing moves.
 
-        An arm in a protective stop is then in FAULT, and `recover` is for it.
+        With an arm in a protective stop, the state is then FAULT. `recover` leaves it.
 
         Raises:
-            RobotError: No arm answers, its controller cannot be used, a joint would
-                come to its limits in the reach, it is somewhere else than at the table,
-                or it is in an emergency stop.
+            RobotError: No arm responds, its controller cannot be used, a joint would
+                reach its limits in the workspace, the arm is not at the table, or it is
+                in an emergency stop.
         """
         check_arm(self.config)
         memory = Mailbox.allocate()
@@ -118,16 +118,16 @@ class Robot:
 
     @property
     def pid(self) -> int | None:
-        """Number of the driver's process."""
+        """ID of the robot client's process."""
         return self._process.pid if self._process else None
 
     def get_observation(self) -> RobotObservation:
-        """Return the newest observation of driver and arm, table frame."""
+        """Return the newest observation of robot client and arm, table frame."""
         return self._mailbox.observation
 
     @property
     def state(self) -> DriverState:
-        """State of the driver."""
+        """State of the robot client."""
         return DriverState(int(self.get_observation().state))
 
     @property
@@ -137,50 +137,54 @@ class Robot:
 
     @property
     def transitions(self) -> list[StateChange]:
-        """Last changes of the driver's state with their reasons, the newest last."""
+        """Last changes of the state with their reasons, the newest last."""
         return self._mailbox.transitions
 
     @property
     def commanded_at(self) -> float:
-        """Time of the last command, of the monotonic clock, s."""
+        """Time of the last command, monotonic clock, s."""
         return self._mailbox.request.stamp
 
     @property
     def is_connected(self) -> bool:
-        """True while the driver runs and sends observations."""
+        """True while the robot client runs and sends observations."""
         running = self._process is not None and self._process.is_alive()
         return running and time.monotonic() - self.get_observation().stamp < SILENT
 
     @property
     def track(self) -> Array:
-        """(n, 3) time, s, x and y, m, of the paddle, the newest last."""
+        """Time, s, and x and y, m, of the paddle (n, 3), the newest last."""
         return self._mailbox.track
 
     def enable(self) -> None:
-        """Take commands from now on; whoever holds the enabling device calls it."""
+        """Accept commands from now on.
+
+        The person who holds the enabling device calls it.
+        """
         with self._lock:
             self._enabled = 1.0
             self._request(np.zeros(2), 0.0)
 
     def disable(self) -> None:
-        """Brake and take no commands, also those of other threads."""
+        """Brake and accept no commands, including those of other threads."""
         with self._lock:
             self._enabled = 0.0
             self._request(np.zeros(2), 0.0)
 
     def send_action(self, velocity: Array, seconds: float) -> Array:
-        """Command a velocity, to be reached in some seconds.
+        """Command a velocity.
 
-        It holds until the next command, and no longer than 0.15 s.
+        The command is valid until the next one, and no longer than 0.15 s.
 
         Args:
-            velocity: (2,) table frame, m/s.
-            seconds: Time of a linear ramp to it, s.
+            velocity: Target velocity (2,), table frame, m/s.
+            seconds: Time of a linear ramp to the velocity, s.
 
         Returns:
-            (2,) velocity that the driver was sent, m/s: no faster than the limits
-            allow, and zero for one that is not finite or while the robot is not
-            enabled. What the arm was sent in turn is in the next observation.
+            Velocity (2,) that was sent to the robot client, m/s. It is clipped to the
+            speed limit. It is zero if the given velocity is not finite or the robot is
+            not enabled. The next observation contains the velocity that was sent to the
+            arm.
 
         Raises:
             ValueError: The velocity has another shape.
@@ -207,7 +211,8 @@ class Robot:
         """Move the paddle slowly to a position (2,), table frame, m, and rest there.
 
         Raises:
-            RobotError: It does not arrive in time, with the reason.
+            RobotError: The paddle does not arrive in time. The message contains the
+                reason.
         """
         until = time.monotonic() + seconds
         self.enable()
@@ -224,16 +229,17 @@ class Robot:
             time.sleep(0.02)
         self.disable()
         raise RobotError(
-            f"robot: the paddle did not come to {np.round(position, 3)} m within "
+            f"robot: the paddle did not reach {np.round(position, 3)} m within "
             f"{seconds:.0f} s; {self.state.name}: {self.fault.label}"
         )
 
     def recover(self) -> None:
-        """Continue after a protective stop, on an operator's word.
+        """Continue after a protective stop, with the confirmation of an operator.
 
         Raises:
-            RobotError: An emergency stop, which a person releases at the pendant before
-                the driver is started again; or the stop was less than 5 s ago.
+            RobotError: The robot is in an emergency stop, which a person releases at
+                the pendant before the robot client is started again; or the stop was
+                less than 5 s ago.
         """
         if self.fault is Fault.EMERGENCY_STOP:
             raise RobotError(EMERGENCY)
@@ -255,7 +261,7 @@ class Robot:
         )
 
     def disconnect(self) -> None:
-        """Brake, disconnect and end the driver."""
+        """Brake, disconnect and end the robot client."""
         if self._process is None:
             return
         if self._box is not None and self._process.is_alive():

@@ -1,13 +1,13 @@
-"""Shaper: the last filter before an arm, applied to each commanded position.
+"""Shaper: last filter before an arm, applied to each commanded position.
 
-It turns arbitrary target velocities into positions that an arm can follow: within
-limits of speed, acceleration and jerk, and inside the reach. It continues from its last
-output, not from the measured position of the arm.
+It converts arbitrary target velocities into positions that an arm can follow, within
+limits of speed, acceleration and jerk, and inside the workspace. It continues from its
+last output, not from the measured position of the arm.
 
 The limits hold for any target, because after every step the paddle can still brake to
-rest within speed and reach. A step that would break this is mixed with the braking
-step. The braking step is always safe, as it begins the braking that was checked one
-step before.
+rest within the limits of speed and workspace. A step that would violate this is mixed
+with the braking step. The braking step is always safe, as it begins the braking that
+was checked one step before.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from marl_airhockey.sim.core.geometry import half_planes
 from marl_airhockey.types import Array
 
 HALVINGS = 4
-"""Number of bisection steps in the search for a mixture with braking"""
+"""Number of bisection steps in the search for a mixture with braking."""
 LONGEST = 250
-"""Largest number of steps until rest"""
+"""Largest number of steps until rest."""
 AT_REST = 1e-9
-"""Speed, m/s, and acceleration, m/s2, below which braking is over"""
+"""Speed, m/s, and acceleration, m/s2, below which braking is over."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,11 @@ class MotionLimits:
     """
 
     speed: float = 0.7
-    """m/s"""
+    """Top speed, m/s."""
     acceleration: float = 7.0
-    """m/s2"""
+    """Largest acceleration, m/s2."""
     jerk: float = 280.0
-    """m/s3: a reversal of the acceleration in a control step of 50 ms"""
+    """Largest jerk, m/s3; it reverses the acceleration in a step of 50 ms."""
 
     def __post_init__(self) -> None:
         check_fields(self, speed=(1e-3, 10), acceleration=(0.01, 1e3), jerk=(0.1, 1e7))
@@ -59,10 +59,11 @@ class Shaper:
 
     Args:
         limits: Limits of the motion.
-        reach: (K, 2) convex polygon of the paddle's centre, counter-clockwise, m.
+        reach: Workspace, a convex polygon (K, 2) of the paddle's centre,
+            counter-clockwise, m.
         dt: Time between two steps, s.
-        place: (2,) position of the resting paddle, m.
-        margin: Least distance from the edge of the reach, m.
+        place: Position (2,) of the resting paddle, m.
+        margin: Least distance from the edge of the workspace, m.
     """
 
     def __init__(
@@ -91,22 +92,22 @@ class Shaper:
 
     @property
     def place(self) -> Array:
-        """(2,) last commanded position, m."""
+        """Last commanded position (2,), m."""
         return _array(self._place)
 
     @property
     def velocity(self) -> Array:
-        """(2,) velocity at the last commanded position, m/s."""
+        """Velocity (2,) at the last commanded position, m/s."""
         return _array(self._velocity)
 
     @property
     def acceleration(self) -> Array:
-        """(2,) acceleration of the last step, m/s2."""
+        """Acceleration (2,) of the last step, m/s2."""
         return _array(self._acceleration)
 
     @property
     def at_rest(self) -> bool:
-        """True if the last commanded positions do not move."""
+        """True if the last commanded position does not move."""
         return abs(self._velocity) < AT_REST
 
     def scale_speed(self, fraction: float) -> None:
@@ -117,8 +118,9 @@ class Shaper:
         """Move by ``dt`` and return the new position (2,), m.
 
         Args:
-            velocity: (2,) target velocity, m/s; rest if it is not finite.
-            seconds: Time of a linear ramp to it, s; 0 for as fast as possible.
+            velocity: Target velocity (2,), m/s. A value that is not finite means rest.
+            seconds: Time of a linear ramp to the velocity, s; 0 for as fast as
+                possible.
         """
         target = self._inside(_fitted(complex(*velocity), self._speed))
         moved = self._velocity, self._acceleration
@@ -153,7 +155,7 @@ class Shaper:
         return _fitted(acceleration + jerk, limits.acceleration)
 
     def _recoverable(self, wish: complex) -> complex:
-        """Return ``wish``, mixed with braking as far as all limits need it."""
+        """Return ``wish``, mixed with as much braking as the limits require."""
         if self._can_brake(wish):
             return wish
         braking = best = self._toward(0j, 0.0, self._velocity, self._acceleration)
@@ -166,7 +168,7 @@ class Shaper:
         return best
 
     def _can_brake(self, acceleration: complex) -> bool:
-        """Return whether a step, and braking after it, keep to speed and reach."""
+        """Return True if a step, then braking, stay within speed and workspace."""
         place, velocity, dt = self._place, self._velocity, self._dt
         way = []
         for _ in range(LONGEST):

@@ -1,4 +1,4 @@
-"""Start of a robot: what is checked before anything moves, and why it fails."""
+"""Start of a robot: checks before anything moves, and reasons of failures."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ EMERGENCY = "robot: emergency stop; release it at the pendant, then start again"
 
 
 class RobotError(RuntimeError):
-    """Error of a robot that does not do what it was commanded."""
+    """Error of a robot that does not execute a command."""
 
 
 def check_arm(config: RobotConfig) -> None:
-    """Refuse a controller, and a reach in which joints come to their limits.
+    """Check a controller, and that no joint reaches its limits in the workspace.
 
     Raises:
-        RobotError: No controller answers, it cannot be used, or a joint would come to
-            its limits in the reach.
+        RobotError: No controller responds, it cannot be used, or a joint would reach
+            its limits in the workspace.
     """
     try:
         check_controller(config.host)
@@ -41,11 +41,11 @@ def check_arm(config: RobotConfig) -> None:
 
 
 def start_failure(host: str, now: RobotObservation) -> str:
-    """Return why a driver is not ready after its start, and the remedy.
+    """Return why a robot client is not ready after its start, and a remedy.
 
     Args:
         host: Address of the arm's controller.
-        now: Newest observation of the driver.
+        now: Newest observation of the robot client.
     """
     if now.fault == Fault.EMERGENCY_STOP:
         return EMERGENCY
@@ -53,10 +53,12 @@ def start_failure(host: str, now: RobotObservation) -> str:
         angle, most = np.degrees(now.misalignment), np.degrees(MISALIGNED)
         return (
             f"robot at {host}: the tool is at x {now.x:+.2f}, y {now.y:+.2f}, z "
-            f"{now.z:+.3f} m of the table, turned by {angle:.0f} deg; expected over "
-            f"its reach, z {-LIFTED} to {AWAY} m, turned by at most {most:.0f} deg; "
+            f"{now.z:+.3f} m of the table, turned by {angle:.0f} deg; expected above "
+            f"its workspace, z {-LIFTED} to {AWAY} m, turned by at most {most:.0f} "
+            "deg; "
             "move it there by hand, or calibrate the mounting again"
         )
     return (
-        f"robot at {host}: its program did not start; does another client control it?"
+        f"robot at {host}: its control script did not start; does another client "
+        "control it?"
     )

@@ -1,16 +1,16 @@
-"""Supervisor: the states of a driver, and every reason to leave one of them.
+"""States of the robot client, and all reasons to leave them.
 
-    READY    at rest; commands are not taken until the caller enables the driver
+    READY    at rest; commands are ignored until the caller enables the robot
     RUNNING  enabled: the paddle moves as commanded, pressed on the table
-    HOLD     enabled, and braked or braking, because something is missing
-    FAULT    the arm does not follow; a person has to look
+    HOLD     enabled, and braked or braking, because a condition is not met
+    FAULT    the arm does not follow; a person has to inspect it
 
-Outside RUNNING the paddle brakes in the plane. Once it rests there, the arm is stiff
-along the table's normal, too.
+Outside RUNNING the paddle brakes in the plane. Once it rests there, the arm is also
+stiff along the table's normal.
 
-A HOLD ends when what was missing is there again; one of `LATCHED` ends only when the
-caller disables the driver. A FAULT ends by `recovered` alone, which follows an
-operator's word.
+A HOLD ends when the condition is met again. A HOLD with a reason in `LATCHED` ends only
+when the caller disables the robot. A FAULT ends only by `recovered`, which requires the
+confirmation of an operator.
 """
 
 from __future__ import annotations
@@ -27,47 +27,47 @@ from marl_airhockey.hardware.robot.mailbox import (
 )
 
 STALE = 0.15
-"""Age of a command beyond which the paddle brakes, s"""
+"""Age of a command beyond which the paddle brakes, s."""
 SILENT = 0.06
-"""Time without news from a robot that moves that is a fault, s"""
+"""Time without data from the robot after which it is a fault, s."""
 SILENT_AT_REST = 1.0
-"""The same of a robot at rest that nobody holds enabled, s: a machine that opens a page
-may be busy for a moment"""
+"""Time without data after which it is a fault for a robot that rests and is not
+enabled, s; a computer that opens a web page may be busy for a moment."""
 LIFTED = 0.003
-"""Distance from the table's plane at which a paddle is on a puck or a rail, or below
-the table, m"""
+"""Distance from the table's plane beyond which a paddle is on a puck or a rail, or
+below the table, m."""
 AWAY = 0.05
-"""Distance from the reach, and above the table's plane, at which an arm is somewhere
-else than at the table, m"""
+"""Distance from the workspace, and height above the table's plane, beyond which an arm
+is not at the table, m."""
 OFF_TABLE = 0.02
-"""Distance from the table's plane at which a paddle that was on it has left it, m"""
+"""Distance from the table's plane beyond which a paddle has left the table, m."""
 PRESSED = 1.0
-"""Time for which a paddle may take to come down on the table after it was pressed, s"""
+"""Longest time until a pressed paddle is down on the table, s."""
 LATE, LATE_TIME = 0.7, 0.2
-"""Share of the largest deviation that an arm may have for this time, s"""
+"""Share of the largest deviation, and time for which an arm may exceed it, s."""
 LATCHED = (Fault.PADDLE_LIFTED, Fault.PADDLE_BELOW_TABLE, Fault.DEVIATION)
-"""Reasons of a HOLD that ends only when the caller disables the driver"""
+"""Reasons of a HOLD that ends only when the caller disables the robot."""
 log = logging.getLogger("marl_airhockey.robot")
 
 
 class Readings(NamedTuple):
-    """Quantities that a supervisor looks at in a cycle."""
+    """Quantities that a supervisor checks in a cycle."""
 
     height: float
-    """Height of the paddle above the table's plane, m"""
+    """Height of the paddle above the table's plane, m."""
     deviation: float
-    """Distance of the paddle from where it usually is by now, m"""
+    """Distance of the paddle from its expected position, m."""
     moving: bool
-    """True if the paddle was sent to a place other than the last"""
+    """True if the sent position of the paddle moves."""
 
 
 class Supervisor:
-    """Supervisor of one driver.
+    """Supervisor of one robot client.
 
     Args:
-        now: Time of the monotonic clock, s.
-        stamp: Time of the robot's clock, s.
-        deviation: Largest distance of an arm from where it usually is by now, m.
+        now: Present time, monotonic clock, s.
+        stamp: Present time, robot's clock, s.
+        deviation: Largest distance of an arm from its expected position, m.
     """
 
     def __init__(self, now: float, stamp: float, deviation: float) -> None:
@@ -105,7 +105,7 @@ class Supervisor:
             self._must_let_go |= fault in LATCHED
 
     def silent(self, now: float) -> bool:
-        """Return True if the robot has sent no news for too long."""
+        """Return True if the robot has sent no data for too long."""
         return now - self._heard > SILENT
 
     def watch_arm(self, now: float, reading: Reading, measured: Readings) -> None:
@@ -128,7 +128,7 @@ class Supervisor:
         return bool(self.pressed_at) and now - self.pressed_at > PRESSED
 
     def _is_late(self, now: float, deviation: float) -> bool:
-        """Return True for an arm that is too late, or late for long while it runs."""
+        """Return True if an arm is too late, or late for too long while it runs."""
         runs = self.state is DriverState.RUNNING
         if not runs or deviation < LATE * self._deviation:
             self._late_since = now
@@ -139,13 +139,13 @@ class Supervisor:
         return -OFF_TABLE <= height <= above
 
     def _learn_why(self, now: float, reading: Reading) -> None:
-        """Take the reason of a stop, which may arrive after its effect."""
+        """Update the reason of a stop, which may arrive after its effect."""
         lost = self.fault is Fault.PROGRAM_LOST and reading.fault is not ArmFault.NONE
         if lost or reading.fault is ArmFault.EMERGENCY_STOP:
             self.fail(now, Fault(reading.fault))
 
     def watch_request(self, now: float, request: Request, measured: Readings) -> None:
-        """Enter READY, RUNNING or HOLD, as the caller's request says."""
+        """Enter READY, RUNNING or HOLD, depending on the caller's request."""
         if self.state is DriverState.FAULT:
             return
         if not request.enabled:
@@ -165,7 +165,7 @@ class Supervisor:
             self._change(now, DriverState.RUNNING, Fault.NONE)
 
     def recovered(self, now: float, enabled: bool) -> None:
-        """Leave FAULT; a caller that still holds the driver enabled must let go."""
+        """Leave FAULT; a caller that still enables the robot must first disable it."""
         self._must_let_go, self._heard = enabled, now
         self._change(now, DriverState.READY, Fault.NONE)
 

@@ -1,8 +1,7 @@
-"""UR5e over the real-time interface of its controller, by ur-rtde.
+"""Arm driver of a UR5e, over the real-time interface of its controller (ur-rtde).
 
-The client has defects that it does not report. They are worked around here, each where
-a comment says so. It must live in a process of its own: after one lost connection it
-reconnects for ever.
+ur-rtde has defects that it does not report. Comments mark the workarounds. It must run
+in a separate process, because it reconnects forever after a lost connection.
 """
 
 from __future__ import annotations
@@ -23,20 +22,20 @@ if TYPE_CHECKING:
     from rtde_control import RTDEControlInterface
 
 WATCHDOG = 10.0
-"""Hz: the controller itself ends the program if commands come more rarely"""
+"""Least rate of commands, Hz; below it, the controller ends the control script."""
 CYCLE = 0.02
-"""Time of the controller's clock that must pass between two commands, s: ten of its
-cycles, as what is read of the clock may be a few cycles old"""
+"""Least time between two commands on the controller's clock, s: ten of its cycles, as a
+reading of the clock may be a few cycles old."""
 LONGEST = 0.2
-"""Longest wait for that, s; a robot that is silent is a fault after less"""
+"""Longest wait for that time, s; a silent robot is a fault after a shorter time."""
 ARRIVED = 0.02
-"""Time after which the reason of a refusal has arrived, s"""
+"""Time after which the reason of a rejected command has arrived, s."""
 STOP = 5.0
-"""Deceleration of joints in a halt, rad/s2"""
+"""Deceleration of joints in a halt, rad/s2."""
 ANSWER = 2000
-"""Longest time until a dashboard answers, ms"""
+"""Longest time until a dashboard responds, ms."""
 OLDEST, NEWER = (5, 4), (6, 0)
-"""Oldest version of PolyScope that is supported, and the first that is not again"""
+"""Oldest supported version of PolyScope, and the first later one that is not."""
 VARIABLES = (
     *("timestamp", "actual_TCP_pose", "actual_TCP_speed", "actual_TCP_force"),
     "actual_q",
@@ -46,15 +45,15 @@ VARIABLES = (
 
 
 class PoseReader:
-    """Reader of an arm's tool, which moves nothing.
+    """Reader of the tool pose of an arm, which moves nothing.
 
     The tool's centre is the one that is set at the pendant: the paddle's foot.
 
     Args:
-        host: address of its controller.
+        host: Address of the controller.
 
     Raises:
-        RuntimeError: ur-rtde is not installed, or no controller answers.
+        RuntimeError: ur-rtde is not installed, or no controller responds.
     """
 
     def __init__(self, host: str) -> None:
@@ -72,7 +71,7 @@ class PoseReader:
     def read(self) -> tuple[float, Array, Array]:
         """Return the robot's time, s, the pose (6,) and the velocity (6,), per s.
 
-        A time that does not advance means a robot that is silent.
+        If the time does not advance, the robot is silent.
         """
         velocity = np.array(self._receive.getActualTCPSpeed())
         return self._receive.getTimestamp(), self.pose(), velocity
@@ -83,10 +82,10 @@ class PoseReader:
 
 
 def check_controller(host: str) -> None:
-    """Refuse a controller that a driver cannot use, before anything connects.
+    """Check that a robot client can use a controller, before anything connects.
 
     Raises:
-        RuntimeError: ur-rtde is not installed, no controller answers, its version is
+        RuntimeError: ur-rtde is not installed, no controller responds, its version is
             not supported, it is not in remote control, or the arm has no power.
     """
     require("dashboard_client", "hardware")
@@ -124,17 +123,17 @@ def check_controller(host: str) -> None:
 
 
 class Ur5e:
-    """UR5e as an `arm.Arm`.
+    """Arm driver of a UR5e.
 
     Args:
-        config: Configuration of its driver.
+        config: Configuration of the robot.
 
     Raises:
-        RuntimeError: ur-rtde is not installed, or no controller answers.
+        RuntimeError: ur-rtde is not installed, or no controller responds.
     """
 
     def __init__(self, config: RobotConfig) -> None:
-        # Constructors hold Python's lock until they have connected.
+        # Constructors hold the global interpreter lock until they have connected.
         require("rtde_control", "hardware")
         from rtde_receive import RTDEReceiveInterface
 
@@ -147,9 +146,9 @@ class Ur5e:
             self._control()
 
     def _control(self) -> RTDEControlInterface:
-        """Return the program on the controller, started when it is first needed.
+        """Return the client of the control script, which starts when first needed.
 
-        An arm that is stopped starts none.
+        A stopped arm does not start it.
         """
         if self._program is None:
             from rtde_control import RTDEControlInterface
@@ -162,8 +161,8 @@ class Ur5e:
         return self._program
 
     def read(self) -> Reading:
-        # After a loss these return the last values without an error: only the stamp
-        # tells that time goes on.
+        # After a lost connection these return the last values without an error. Only
+        # the stamp shows whether they are new.
         r = self._receive
         return Reading(
             r.getTimestamp(),
@@ -172,7 +171,7 @@ class Ur5e:
             np.array(r.getActualTCPForce()),
             np.array(r.getActualQ()),
             self._fault(),
-            # The slider, times what else slows the arm.
+            # Speed slider, times all other factors that slow the arm.
             r.getSpeedScaling() * r.getTargetSpeedFraction(),
         )
 
@@ -203,33 +202,33 @@ class Ur5e:
         self._wait_cycle()
 
     def release(self, pose: Array) -> None:
-        # The pose first: a stiff arm moves to the last height that it was sent.
+        # Send the pose first: a stiff arm moves to the last height that it was sent.
         if self.follow(pose, CYCLE):
             self._wait_cycle()
             self._obeys(self._control().forceModeStop)
 
     def _obeys(self, command: Callable[[], bool]) -> bool:
-        """Return whether the controller takes a command of the client."""
+        """Run a command of the client; return True if the controller accepts it."""
         try:
             return command()
         except RuntimeError:
-            # The connection is lost. The client reconnects for ever, and uploads its
-            # script each time: nothing of it can be used again.
+            # The connection is lost. The client reconnects forever, and uploads its
+            # script each time, so it cannot be used again.
             self._lost = True
             return False
 
     def _wait_cycle(self) -> None:
         """Wait until the controller has read its registers.
 
-        Of two commands in one of its cycles it takes the last alone.
+        Of two commands in one of its cycles it executes only the last.
         """
         began, until = self._receive.getTimestamp(), time.monotonic() + LONGEST
         while self._receive.getTimestamp() - began < CYCLE and time.monotonic() < until:
             time.sleep(0.0005)
 
     def follow(self, pose: Array, seconds: float) -> bool:
-        # The client passes numbers that are not finite, and its own limits of speed
-        # and acceleration do nothing: both are the shaper's.
+        # The client accepts numbers that are not finite, and its limits of speed and
+        # acceleration have no effect. The shaper limits both.
         if not np.isfinite(pose).all():
             return False
         loop, program = (self._servo.look_ahead, self._servo.gain), self._control()
@@ -239,7 +238,7 @@ class Ur5e:
         return sent
 
     def halt(self) -> None:
-        # `stopL` brakes joints; this is the one that does what its name says.
+        # `stopL` brakes joints; `servoStop` does what its name suggests.
         program = self._control()
         if self._obeys(lambda: program.servoStop(STOP)):
             self._obeys(program.forceModeStop)
@@ -256,7 +255,7 @@ class Ur5e:
             return str(error)
         finally:
             board.disconnect()
-        # The old command still stands in the registers and would run at once.
+        # The old command is still in the registers and would run immediately.
         if self._program is not None:
             self._program.servoStop(STOP)
             time.sleep(0.05)

@@ -1,1 +1,1 @@
-"""Table: the backend of a real table, with a camera above and an arm at its home."""
+"""Backend of a real table, with a camera above it and an arm at its home side."""

@@ -1,4 +1,4 @@
-"""Real backend: the state comes from camera and robot, steps run in real time."""
+"""Backend of a real table: state from camera and robot, steps in real time."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ from marl_airhockey.types import Array
 
 log = logging.getLogger("marl_airhockey.real")
 PROFILE = "ur5e"
-"""Profile of the table's robot"""
+"""Profile of the table's robot."""
 BLIND = 0.3
-"""Time without a camera frame after which an episode ends, s"""
+"""Time without a camera frame after which an episode ends, s."""
 DELAYED = 0.15
-"""Time from an exposure until its frame arrives after which an episode ends, s"""
+"""Time from an exposure until its frame arrives after which an episode ends, s."""
 LATE = 0.02
-"""Time from the end of a step to the next command above which it is logged, s"""
+"""Time from the end of a step to the next command beyond which it is logged, s."""
 LOST = 2.0
-"""Time for which a puck may be unseen, s"""
+"""Time for which a puck may be unseen, s."""
 
 
 class RealBackend(LiveBackend):
-    """Backend of one real table: a camera sees the puck, an arm moves the paddle.
+    """Backend of one real table: a camera observes the puck, an arm moves the paddle.
 
     A step sends a command, waits for the end of the step and returns the state. The arm
-    reports the paddle. A filter with the table's physics estimates the puck from all
-    frames so far. If the robot stops, or no frame or puck arrives for too long, the
-    paddle brakes and `interruption` gives the reason.
+    reports the paddle's state. A filter with the table's physics estimates the puck
+    from all frames so far. If the robot stops, or no frame or puck arrives for too
+    long, the paddle brakes and `interruption` gives the reason.
 
     Args:
         scene: Scene on the table.
@@ -185,7 +185,7 @@ class RealBackend(LiveBackend):
             self.robot.disable()
 
     def _report_lateness(self, began: float) -> None:
-        """Log a step whose command comes late, and what took the time.
+        """Log a warning if the command of a step is late.
 
         Args:
             began: Time at which the step began, s.
@@ -199,7 +199,7 @@ class RealBackend(LiveBackend):
             )
 
     def _trouble(self, now: float) -> str:
-        """Return why the episode cannot continue; "" if it can."""
+        """Return the reason why the episode cannot continue; "" if it can."""
         robot = self.robot
         # A HOLD because commands were late ends with the next command.
         held = robot.state is DriverState.HOLD and robot.fault in LATCHED
@@ -210,7 +210,7 @@ class RealBackend(LiveBackend):
         return self._blindness(now) if self.scene.pucks else ""
 
     def _blindness(self, now: float) -> str:
-        """Return why the puck's state is not known; "" if it is."""
+        """Return the reason why the puck's state is not known; "" if it is."""
         camera, last = self.camera, self._tracker.last
         if camera.age > BLIND:
             return camera.trouble
@@ -223,7 +223,7 @@ class RealBackend(LiveBackend):
         return self._tracker.innovations.trouble
 
     def _fill(self, state: State, now: float, since: float) -> None:
-        """Fill a state with positions and velocities now and new contacts.
+        """Fill a state with present positions and velocities, and with new contacts.
 
         Args:
             state: State of the one world.

@@ -1,4 +1,4 @@
-"""Devices of a real table: its camera, what finds the puck, and its robot."""
+"""Devices of a real table: its camera, the detector of the puck, and its robot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.table import TABLES
 
 FIRST_FRAME = 10.0
-"""Longest time from opening a camera to its first frame, s"""
+"""Longest time from opening a camera to its first frame, s."""
 
 
 class TableDevices:
@@ -29,9 +29,9 @@ class TableDevices:
         rig: Description of the devices.
 
     Raises:
-        ValueError: The scene is of another table.
-        RuntimeError: A device does not answer, or the camera does not show the table
-            with one puck; with the remedy.
+        ValueError: The scene has another table.
+        RuntimeError: A device does not respond, or the camera does not show the table
+            with one puck. The message contains a remedy.
     """
 
     def __init__(self, scene: Scene, rig: Rig) -> None:
@@ -73,13 +73,13 @@ class TableDevices:
             raise RuntimeError(f"camera {self.rig.camera}: {trouble}")
 
     def _check_pucks(self, detector: Detector) -> None:
-        """Refuse a table on which several objects have the puck's colour."""
+        """Check that not several objects on the table have the puck's colour."""
         frame = self.camera.newest
         assert frame is not None
         found = [np.round(seen.place, 2).tolist() for seen in detector.find_all(frame)]
         if len(found) > 1:
             raise RuntimeError(
-                f"camera: {len(found)} things have the puck's colour and size, at "
+                f"camera: {len(found)} objects have the puck's colour and size, at "
                 f"{found} m; leave one puck on the table, or calibrate another colour"
             )
 

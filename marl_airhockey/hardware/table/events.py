@@ -1,4 +1,4 @@
-"""Events: paddle contacts and wall bounces between two sightings of a puck.
+"""Detection of paddle contacts and wall bounces between two sightings of a puck.
 
 A camera rarely takes a frame at the moment of a contact. So the puck's path is
 extrapolated forward from the older sighting and backward from the newer one. There was
@@ -17,25 +17,25 @@ from marl_airhockey.types import Array
 
 
 class MeasuredPuck(NamedTuple):
-    """Puck at one time."""
+    """Measured state of the puck at one time."""
 
     time: float
-    """s"""
+    """Time of the sighting, s."""
     place: Array
-    """(2,) m"""
+    """Position (2,), table frame, m."""
     velocity: Array
-    """(2,) m/s"""
+    """Velocity (2,), table frame, m/s."""
 
 
 class MeasuredContacts(NamedTuple):
     """Contacts of a puck between two times."""
 
     paddle_at: float
-    """Time of the contact with the paddle, s; nan without one"""
+    """Time of the contact with the paddle, s; nan without one."""
     banks: Array
-    """(sides,) bool, True for sides with a wall bounce"""
+    """True for sides with a wall bounce, bool (sides,)."""
     velocity: Array
-    """(2,) velocity before the contacts, m/s"""
+    """Velocity (2,) before the contacts, m/s."""
 
 
 def find_contacts(
@@ -47,8 +47,8 @@ def find_contacts(
         scene: Table and sizes of the bodies.
         before: Older sighting.
         after: Newer sighting.
-        times: (n,) times of the reported paddle positions, s.
-        paddle: (n, 2) reported positions of the paddle, table frame, m.
+        times: Times (n,) of the reported paddle positions, s.
+        paddle: Reported positions (n, 2) of the paddle, table frame, m.
     """
     table = scene.table
     first, last = (np.array([t.time, *t.place, *t.velocity]) for t in (before, after))

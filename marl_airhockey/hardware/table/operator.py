@@ -1,4 +1,4 @@
-"""Operator: puts the puck at its start position and allows the arm to move."""
+"""Operator who puts the puck at its start position and allows the arm to move."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import Protocol
 from marl_airhockey.types import Array
 
 ANSWER = 5.0
-"""Longest time until a lab answers, s"""
+"""Longest time until a lab answers, s."""
 LOOK = 5.5
-"""Time for which the lab's operator inspects a stopped arm, s"""
+"""Time for which the lab's operator inspects a stopped arm, s."""
 
 
 class Operator(Protocol):
     """Operator of a table."""
 
     def begin(self, motion: str) -> None:
-        """Return when the arm may move for the first time.
+        """Wait until the arm may move for the first time.
 
         Args:
             motion: Text for a person: where the arm may move and how fast.
@@ -31,18 +31,18 @@ class Operator(Protocol):
         """Put the puck at its start position and hold it there.
 
         Args:
-            puck: (2,) start position, table frame, m.
-            velocity: (2,) velocity at the release, table frame, m/s.
+            puck: Start position (2,), table frame, m.
+            velocity: Velocity (2,) at the release, table frame, m/s.
 
         Raises:
-            RuntimeError: The operator does not do it.
+            RuntimeError: The operator does not place the puck.
         """
 
     def release(self) -> None:
         """Release the puck, with the requested velocity as far as possible."""
 
     def allow(self, stop: str) -> None:
-        """Return when a stopped arm has been inspected and may continue.
+        """Wait until a stopped arm has been inspected and may continue.
 
         Args:
             stop: Reason of the stop, as a text for a person.
@@ -50,15 +50,15 @@ class Operator(Protocol):
 
 
 Ask = Callable[[str], None]
-"""Function that shows a text to a person and returns when they agree"""
+"""Function that shows a text to a person and returns when the person agrees."""
 
 
 class LabOperator:
     """Operator of a virtual lab, which carries out requests exactly.
 
     Args:
-        port: Port of the lab's door, on the loopback address.
-        ask: Function that asks whether a stopped arm may continue.
+        port: Port of the lab's RPC server, on the loopback address.
+        ask: Function that requests permission for a stopped arm to continue.
     """
 
     def __init__(self, port: int, ask: Ask) -> None:
@@ -92,7 +92,7 @@ class PersonOperator:
     """Operator who is a person.
 
     Args:
-        ask: Function that asks the person.
+        ask: Function that requests a confirmation of the person.
     """
 
     def __init__(self, ask: Ask) -> None:
@@ -126,34 +126,36 @@ def _stopped(why: str) -> str:
 
 
 def ask_at_terminal(words: str) -> None:
-    """Ask a person at the terminal.
+    """Request a confirmation of a person at the terminal.
 
     Raises:
         RuntimeError: The standard input is not a terminal.
     """
     if not sys.stdin.isatty():
         raise RuntimeError(
-            f"operator: no terminal to ask a person at; run it in one: {words}"
+            "operator: the standard input is not a terminal; run the command in one, "
+            f"where a person confirms: {words}"
         )
     print(f"{words} Press Enter to continue, Ctrl+C to end.")
     input()
 
 
 def look(words: str) -> None:
-    """Agree after `LOOK` seconds, as the virtual lab's operator."""
-    # A stopped arm refuses to continue earlier.
+    """Confirm after `LOOK` seconds, as the virtual lab's operator."""
+    # A stopped arm cannot continue earlier.
     time.sleep(LOOK)
 
 
 def make_operator(text: str, ask: Ask | None = None) -> Operator:
-    """Return the operator that a rig names.
+    """Return the operator of a rig.
 
     Args:
-        text: ``person`` or ``lab:PORT``.
-        ask: Function that asks a person; None for the terminal, or `look` in a lab.
+        text: Name of the operator, ``person`` or ``lab:PORT``.
+        ask: Function that requests a confirmation of a person; None for the terminal,
+            or for `look` in a lab.
 
     Raises:
-        ValueError: The text names no operator.
+        ValueError: There is no such operator.
     """
     kind, _, port = text.partition(":")
     if kind == "person" and not port:

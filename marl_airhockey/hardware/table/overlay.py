@@ -1,4 +1,4 @@
-"""Overlay: a camera frame with the estimated bodies and marks drawn over it."""
+"""Camera frame with the estimated bodies and marks drawn over it."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from marl_airhockey.types import Array
 
 CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 37)) for f in (np.cos, np.sin)], 1)
 PUCK, PADDLE, RAIL = (255, 240, 0), (255, 140, 0), (90, 140, 255)
-"""Colours: red, green, blue"""
+"""Colours: red, green, blue."""
 MARKS: dict[Meaning, tuple[int, int, int]] = {
     "goal": (0, 220, 120),
     "reward": (255, 215, 60),
     "cost": (255, 60, 60),
     "drag": (170, 180, 200),
 }
-"""Colours of marks by what they mean"""
+"""Colours of marks by their meaning."""
 AHEAD = 0.15
-"""Time for which the velocity line extends the puck's motion, s"""
+"""Time for which the velocity line extends the puck's motion, s."""
 
 
 class Overlay:
@@ -45,12 +45,13 @@ class Overlay:
         marks: Sequence[Mark],
         width: int,
     ) -> Array:
-        """Return (H, W, 3) uint8 RGB, ``width`` pixels wide.
+        """Return an RGB image (H, W, 3) uint8 that is ``width`` pixels wide.
 
         Args:
             image: Frame (H, W, 3) uint8, blue, green, red.
-            paddle: (2,) position of the paddle, table frame, m.
-            puck: (4,) position, m, and velocity, m/s, of the puck; None without one.
+            paddle: Position (2,) of the paddle, table frame, m.
+            puck: Position, m, and velocity, m/s, of the puck (4,), table frame; None
+                without a puck.
             marks: Marks of the scenario.
             width: Width of the result, px.
         """

@@ -1,4 +1,4 @@
-"""Placing: what happens on a real table between two episodes."""
+"""Placement of paddle and puck on a real table between two episodes."""
 
 from __future__ import annotations
 
@@ -15,41 +15,41 @@ from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array
 
 FIRST = 3
-"""Number of sightings from which the first estimate is made"""
+"""Number of sightings for the first estimate."""
 SEEN_AGAIN = 2.0
-"""Longest time from a puck's release until it has been seen so often, s"""
+"""Longest time from a puck's release until its `FIRST` sightings, s."""
 PLACING = 30.0
-"""Longest time until a placed puck is seen, s"""
+"""Longest time until a placed puck is seen, s."""
 APART = 0.08
-"""Largest accepted distance of a placed puck from its target position, m"""
+"""Largest accepted distance of a placed puck from its target position, m."""
 
 
 class Placing:
-    """Placing of paddle and puck, by the robot and an operator.
+    """Placement of paddle and puck, by the robot and an operator.
 
     Args:
         devices: Devices of the table.
-        scene: Scene on it.
+        scene: Scene on the table.
     """
 
     def __init__(self, devices: TableDevices, scene: Scene) -> None:
         self._devices, self._scene = devices, scene
         self.operator = make_operator(devices.rig.operator)
-        """Operator, who places the puck and allows the arm to move"""
+        """Operator, who places the puck and allows the arm to move."""
         self._allowed = False
 
     def place(self, state: State) -> list[Sighting]:
-        """Bring about the state in which an episode begins; the robot is ready then.
+        """Set up the state in which an episode begins. Afterwards the robot is ready.
 
         Args:
-            state: State (1, ...).
+            state: State of one world, with arrays (1, ...).
 
         Returns:
             First sightings of the puck after its release; none without a puck.
 
         Raises:
-            RobotError: The robot does not recover, or does not get there.
-            RuntimeError: The puck is not seen, or not where it belongs.
+            RobotError: The robot does not recover, or does not reach its position.
+            RuntimeError: The puck is not seen, or not at its start position.
         """
         robot = self._devices.robot
         if not self._allowed:

@@ -1,4 +1,4 @@
-"""Tracker: the puck's state from camera sightings and reported paddle positions."""
+"""Tracker of the puck's state by camera sightings and reported paddle positions."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from marl_airhockey.sim.sensing.estimator import Estimator
 from marl_airhockey.types import Array
 
 SPACING, PAST = 0.01, 40
-"""Time between two samples of the paddle's path, s, and number of past samples"""
+"""Time between two samples of the paddle's path, s, and number of past samples."""
 SMOOTHED = 0.05
-"""Weight of the newest sighting in the mean distance from the estimate"""
+"""Weight of the newest sighting in the mean distance from the estimate."""
 WORLD = np.zeros(1, np.int64)
-"""Index of the one world"""
+"""Index of the one world."""
 
 
 class Tracker:
@@ -69,7 +69,7 @@ class Tracker:
 
     @property
     def estimate(self) -> Array | None:
-        """(4,) x, y, m, and vx, vy, m/s, of the puck; None if there is none."""
+        """Estimated x, y, m, and vx, vy, m/s, of the puck (4,); None without a puck."""
         return None if self.last is None else self._estimator.now[0, 0, :4].copy()
 
     def fill(
@@ -80,12 +80,12 @@ class Tracker:
         now: float,
         since: float,
     ) -> None:
-        """Fill a state with the puck's estimate for now and its contacts.
+        """Fill a state with the present estimate of the puck and its contacts.
 
         Args:
             state: State of one world, without contacts.
             seen: Sightings since the last call, oldest first.
-            track: (n, 3) time, s, and position, m, of the paddle.
+            track: Times, s, and positions, m, of the paddle (n, 3).
             now: Time of the state, s.
             since: Time at which the step began, s.
         """
@@ -126,7 +126,7 @@ class Tracker:
         touching = bool(np.isfinite(met.paddle_at))
         if touching and not self._touching:
             state.touched[0, 0, 0] += 1
-            # Negative for a contact before this step, which was observed late.
+            # Negative for a contact before this step, which was observed with latency.
             state.touched_at[0, 0, 0] = min(met.paddle_at, now) - since
         self._touching = touching
         state.banked[0, 0] += met.banks
@@ -150,7 +150,7 @@ class Tracker:
         )
 
     def sight(self, looked_at: float) -> Array:
-        """Return (1, pucks, 4) x, y, m, visibility and age, s, in the newest frame.
+        """Return x, y, m, visibility and age, s, of the pucks (1, pucks, 4).
 
         Args:
             looked_at: Time at which the newest frame was taken, s.

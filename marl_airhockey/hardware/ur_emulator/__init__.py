@@ -1,1 +1,1 @@
-"""Controller: a UR5e's, simulated, with the network protocols of the real one."""
+"""Emulated controller of a UR5e, with the network protocols of the real one."""

@@ -1,4 +1,4 @@
-"""Arm: the joints of a simulated UR5e, what moves them, and what stops them."""
+"""Simulated UR5e: its joints, their motions, and safety stops."""
 
 from __future__ import annotations
 
@@ -29,66 +29,66 @@ from marl_airhockey.hardware.ur_emulator.safety import Safety
 from marl_airhockey.types import Array
 
 DT = 0.002
-"""Period of the controller, s"""
+"""Period of the controller, s."""
 HALF_RISE = 1.678
-"""Time times frequency at which a critically damped lag is half-way"""
+"""Product of time and frequency at half of a step of a critically damped lag."""
 JOINT_SPEED = np.pi
-"""Largest speed of a joint, rad/s: the maker's 180 degrees a second"""
+"""Largest speed of a joint, rad/s; the maker specifies 180 degrees per second."""
 JOINT_ACCELERATION = 25.0
-"""Largest acceleration of a joint that the model's drives give, rad/s2"""
+"""Largest acceleration of a joint in this model, rad/s2."""
 DEVIATION = 0.5
-"""Distance of a joint from its target that is a fault, rad"""
+"""Distance of a joint from its target beyond which the arm stops, rad."""
 FORCE_LIMIT = 150.0
-"""Force on the tool beyond which the arm stops, N"""
+"""Force on the tool beyond which the arm stops, N."""
 FORCE_DAMPING = 100.0
-"""Force error for each m/s of the compliant axis, Ns/m"""
+"""Force error for each m/s of the compliant axis, Ns/m."""
 SCALING_RATE = 4.0
 """Change of the speed scaling per second after the speed slider has moved: 1 to 0 in
-0.25 s"""
+0.25 s."""
 
 
 @dataclass
 class EmulatedArm:
-    """Arm of six joints, moved by a step of `DT`.
+    """Arm of six joints, simulated in steps of `DT`.
 
-    What moves it is its ``motion``; a motion that joints cannot follow, or that is too
-    fast for the tool, ends in a protective stop, as on the real one.
+    Its ``motion`` moves it. A motion that joints cannot follow, or that is too fast for
+    the tool, ends in a protective stop, as on the real arm.
     """
 
     angles: Array
-    """(6,) rad, at the start"""
+    """Joint angles (6,), rad; given for the start."""
     tool: Array
-    """(6,) pose of the tool's centre in the flange's frame"""
+    """Pose (6,) of the tool's centre, flange frame, m and rad."""
     plant: Plant
-    """Model of the objects that the tool touches"""
+    """Model of the objects that the tool touches."""
     tool_speed: float = 1.5
-    """Speed of the tool's centre beyond which the arm stops, m/s"""
+    """Speed of the tool's centre beyond which the arm stops, m/s."""
     motion: Motion = field(default_factory=Halt)
     force: Force | None = None
     safety: Safety = Safety.NORMAL
     stopped: str = ""
-    """Cause of the last stop"""
+    """Cause of the last stop."""
     speed_fraction: float = 1.0
-    """Speed slider: fraction of every programmed speed"""
+    """Speed slider: fraction of every programmed speed."""
     speed_scaling: float = 1.0
-    """Fraction of every programmed speed now: it follows the slider in a ramp"""
+    """Present fraction of programmed speeds, which follows the slider in a ramp."""
 
     def __post_init__(self) -> None:
         self.speeds = np.zeros(6)
         self.rates = np.zeros(6)
         self.target = self.angles.copy()
-        """(6,) joint angles that the motion aims at"""
+        """Target (6,) of the joint angles, rad."""
         self.payload = 0.0
         self._force_zero = np.zeros(6)
         self.force_drift = np.zeros(6)
-        """(6,) error of the force sensor, base frame, N and Nm, a fault"""
+        """Error (6,) of the force sensor, base frame, N and Nm, a fault."""
         self.lag = 1.0
-        """Factor on the lag of `servoL` and `servoJ`, a fault"""
+        """Factor on the lag of `servoL` and `servoJ`, a fault."""
         self._last_scaling = self.speed_scaling
         self.mount(self.tool)
 
     def mount(self, tool: Array) -> None:
-        """Set the tool's centre to a pose (6,) in the flange's frame."""
+        """Set the tool's centre to a pose (6,), flange frame, m and rad."""
         self.tool, self._tool = tool, pose_of(tool)
         self._off_tool = np.linalg.inv(self._tool)
         self._update_pose()
@@ -97,28 +97,28 @@ class EmulatedArm:
     def _update_pose(self) -> None:
         flange, jacobian = forward(self.angles)
         self.pose = flange @ self._tool
-        """(4, 4) of the tool's centre, base frame"""
+        """Pose (4, 4) of the tool's centre, base frame."""
         x, y, z = self.pose[:3, 3] - flange[:3, 3]
         lever = np.array([(0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0)])
         jacobian[:3] += lever @ jacobian[3:]
         self._jacobian = jacobian
         self.twist = jacobian @ self.speeds
-        """(6,) m/s and rad/s of the tool's centre"""
+        """Velocity (6,) of the tool's centre, base frame, m/s and rad/s."""
 
     def _touch(self) -> None:
         self.reading = self.plant(pose_vector(self.pose), self.twist)
 
     @property
     def measured_force(self) -> Array:
-        """(6,) N and Nm, relative to when the sensor was zeroed, base frame."""
+        """Force and torque (6,) since the sensor was zeroed, base frame, N and Nm."""
         return np.asarray(self.reading.force - self._force_zero + self.force_drift)
 
     def zero_force_sensor(self) -> None:
-        """Take the present force as zero, a contact's too, as the real sensor does."""
+        """Zero the force sensor, even in contact, as the real sensor does."""
         self._force_zero = self.reading.force + self.force_drift
 
     def rehearse(self) -> None:
-        """Make every motion on a copy, so that all is compiled before time counts."""
+        """Run every motion on a copy, so that all code is compiled before the start."""
         plant, self.plant = self.plant, lambda pose, velocity: self.reading
         twin, pose = deepcopy(self), pose_vector(self.pose)
         self.plant = plant
@@ -132,11 +132,11 @@ class EmulatedArm:
             twin.step()
 
     def solve(self, pose: Array, near: Array | None = None) -> Array | None:
-        """Return joint angles that give the tool a pose (6,); None without any.
+        """Return joint angles (6,), rad, for a tool pose; None if there are none.
 
         Args:
-            pose: (6,) base frame.
-            near: (6,) angles where the search begins; None for the present target.
+            pose: Pose (6,) of the tool's centre, base frame, m and rad.
+            near: Initial angles (6,) of the search, rad; None for the present target.
         """
         if not np.isfinite(pose).all():
             return None
@@ -145,19 +145,19 @@ class EmulatedArm:
         return angles if found else None
 
     def stop(self, mode: Safety, why: str) -> None:
-        """Stop for safety: brake, and take no motion until it is released."""
+        """Stop for safety: brake, and accept no motion until the release."""
         if self.safety is Safety.ROBOT_EMERGENCY_STOP:
             return
         self.safety, self.stopped = mode, why
         self.motion, self.force = Halt(), None
 
     def release(self) -> None:
-        """Take motions again; the arm stands still until one comes."""
+        """Accept motions again; the arm rests until one arrives."""
         self.safety, self.stopped = Safety.NORMAL, ""
         self.target, self.motion = self.angles.copy(), Halt()
 
     def servo(self, pose: Array, half_rise: float) -> bool:
-        """Follow a pose; False if there are no joint angles for it."""
+        """Follow a pose (6,); return False if there are no joint angles for it."""
         angles = self.solve(pose)
         if angles is not None:
             self.servo_joints(angles, half_rise)
@@ -177,7 +177,7 @@ class EmulatedArm:
         return bool(np.abs(self.speeds).max() < 1e-3)
 
     def step(self) -> None:
-        """Move by a period of the controller."""
+        """Advance by one period of the controller."""
         most = SCALING_RATE * DT
         self._last_scaling = self.speed_scaling
         change = self.speed_fraction - self.speed_scaling
@@ -195,13 +195,13 @@ class EmulatedArm:
         self._watch()
 
     def _goal_speeds(self, motion: Motion) -> Array:
-        """Return the joint speeds (6,) that a motion calls for now, rad/s."""
+        """Return the present joint speeds (6,) of a motion, rad/s."""
         if isinstance(motion, Halt):
             fastest = np.abs(self.speeds).max()
             left = max(fastest - motion.deceleration * DT, 0.0)
             return np.asarray(self.speeds * (left / fastest if fastest else 0.0))
         if isinstance(motion, Servo):
-            # The program's time passes more slowly than the clock.
+            # The time of the control script passes more slowly than the clock.
             rate, scale = HALF_RISE / (self.lag * motion.half_rise), self.speed_scaling
             if min(scale, self._last_scaling) < 1e-6:
                 return np.zeros(6)
@@ -250,7 +250,7 @@ class EmulatedArm:
         return np.asarray(joint_speeds(self._jacobian, self.twist + fit * change))
 
     def _along_axis(self, force: Force) -> Array:
-        """Return the part (6,) of the way to the target that is along the axis, rad.
+        """Return the part (6,) of the distance to the target along the axis, rad.
 
         A compliant axis follows no target.
         """
@@ -263,8 +263,8 @@ class EmulatedArm:
     def _compliance(self, force: Force, speeds: Array) -> Array:
         """Return the change of the joint speeds (6,) by which the tool complies.
 
-        Along the compliant axis the tool moves as fast as the force error says,
-        whatever the motion calls for.
+        Along the compliant axis, only the force error determines the speed of the tool,
+        not the motion.
         """
         axis = pose_of(force.frame)[:3, 2]
         error = self.measured_force[:3] @ axis + force.newtons
@@ -274,7 +274,7 @@ class EmulatedArm:
         return np.asarray(joint_speeds(self._jacobian, twist))
 
     def _watch(self) -> None:
-        """Stop for safety where joints or tool exceed what they may."""
+        """Stop for safety if joints or tool exceed their limits."""
         if self.safety is not Safety.NORMAL:
             return
         if np.abs(self.speeds).max() > JOINT_SPEED:

@@ -1,7 +1,6 @@
 """Controller of an emulated arm: its safety, its script and its faults, without ports.
 
-It is stepped by whoever owns it: `ports.Ports` in real time, `in_process.InProcessArm`
-in emulated time.
+`ports.Ports` steps it in real time, `in_process.InProcessArm` in emulated time.
 """
 
 from __future__ import annotations
@@ -17,35 +16,35 @@ from marl_airhockey.hardware.ur_emulator.safety import SAFETY_BITS, Safety
 from marl_airhockey.hardware.ur_emulator.script import ControlScript
 
 VERSION = (5, 12, 2, 1101534)
-"""Version of PolyScope that is emulated"""
+"""Version of PolyScope that is emulated."""
 STOPPED, PLAYING = 1, 2
-"""Runtime states"""
+"""Runtime states."""
 RUNNING, POWER_OFF = 7, 3
-"""Robot modes"""
+"""Robot modes."""
 JOINT_RUNNING = 253
-"""Mode of a joint that moves as commanded"""
+"""Mode of a joint that moves as commanded."""
 SPACING = 4
-"""Periods between two commands of a client that sends 125 a second"""
+"""Number of periods between two commands of a client that sends 125 per second."""
 OFFSET = re.compile(r"reg_offset_int\s*=\s*(?:#[^\n]*\n)?\s*(\d+)")
-"""Place in the script of ur_rtde where the first of its registers is written"""
+"""Pattern of the number of the first register in the script of ur_rtde."""
 PROGRAM = re.compile(r"^\s*(def|sec) \w+\(|reg_offset_int", re.MULTILINE)
-"""Beginning of a program"""
+"""Pattern of the beginning of a script."""
 REPLACING = 50
-"""Periods for which no program runs when one replaces another"""
+"""Number of periods for which no script runs when one replaces another."""
 OFFSETS = 0, 24
-"""First registers that a script of ur_rtde may use"""
+"""First registers that a script of ur_rtde may use."""
 STALL_EVERY = 250
-"""Periods from one stall to the next, a fault"""
+"""Number of periods from one stall to the next, a fault."""
 UNLOCK_AFTER = 5.0
-"""Time that a protective stop lasts at least, s, as the real dashboard says"""
+"""Least duration of a protective stop, s, as on a real controller."""
 
 
 class Controller:
     """Controller of an arm.
 
     Args:
-        arm: Arm that it controls.
-        version: Version of PolyScope that it reports.
+        arm: Arm that is controlled.
+        version: Reported version of PolyScope.
     """
 
     def __init__(
@@ -54,26 +53,26 @@ class Controller:
         self.arm, self.script, self.version = arm, ControlScript(arm), version
         arm.rehearse()
         self.ticks = 0
-        """Number of periods since the start"""
+        """Number of periods since the start."""
         self.remote = True
-        """True in remote control; at the pendant it can be switched to local"""
+        """True in remote control; the pendant can switch to local control."""
         self.powered = True
-        """True while the arm has power"""
+        """True while the arm has power."""
         self.silent = False
-        """True if no data is sent, a fault"""
+        """True if no data is sent, a fault."""
         self.delay = 0.0
-        """Time by which data is sent late, a fault, s"""
+        """Additional latency of the data, a fault, s."""
         self.stall = 0.0
-        """Time for which programs and data stand still twice a second, a fault, s"""
+        """Time for which scripts and data stall twice a second, a fault, s."""
         self._stall_from = 0
         self.refuses = False
-        """True if connections are closed and refused, a fault"""
+        """True if connections are closed and refused, a fault."""
         self.forgets = False
-        """True if new connections get no data, a fault"""
+        """True if new connections get no data, a fault."""
         self.first_after = 0.0
-        """Time after which a new connection gets its first data, a fault, s"""
+        """Time after which a new connection gets its first data, a fault, s."""
         self.uploads = 0
-        """Number of scripts that clients have sent"""
+        """Number of scripts that clients have sent."""
         self._next_script: tuple[int, int] | None = None
         self._outputs = 0
         self._stopped_at = 0.0
@@ -81,31 +80,31 @@ class Controller:
 
     @property
     def time(self) -> float:
-        """Time since the start, s, of the controller's clock."""
+        """Time since the start, controller's clock, s."""
         return self.ticks * DT
 
     def upload(self, text: str) -> None:
-        """Replace the running program by a script that a client has sent."""
+        """Replace the running script by one that a client has sent."""
         if not (PROGRAM.search(text) and self.ready):
             return
         self.uploads += 1
         waits = REPLACING if self.script.running else 0
         self.script.kill()
-        # Nothing else is run; this is what the script of ur_rtde begins with.
+        # Only the script of ur_rtde is run, which begins with this text.
         found = OFFSET.search(text)
         if found and int(found[1]) in OFFSETS:
             self._next_script = self.ticks + waits, int(found[1])
             self._start_script()
 
     def _start_script(self) -> None:
-        """Start the script that was sent last, once its time has come."""
+        """Start the script that was sent last, when it is due."""
         if self._next_script and self.ticks >= self._next_script[0] and self.ready:
             self.script.start(self._next_script[1])
             self._next_script = None
 
     @property
     def ready(self) -> bool:
-        """True if a program can run."""
+        """True if a script can run."""
         return self.powered and self.arm.safety is Safety.NORMAL
 
     def switch_power(self, on: bool) -> None:
@@ -127,7 +126,7 @@ class Controller:
         print(f"ur-emulator: {self.arm.safety.name}: {self.arm.stopped}", file=stderr)
 
     def unlock(self) -> bool:
-        """Release a protective stop; False less than `UNLOCK_AFTER` s after it."""
+        """Release a protective stop; return False within `UNLOCK_AFTER` s of it."""
         if self.arm.safety is not Safety.PROTECTIVE_STOP:
             return True
         if self.time - self._stopped_at < UNLOCK_AFTER:
@@ -136,29 +135,29 @@ class Controller:
         return True
 
     def set_stall(self, seconds: float) -> None:
-        """Stall for some seconds, now and then twice a second; 0 ends it."""
+        """Start stalls of some seconds, now and twice a second; 0 ends them."""
         self.stall, self._stall_from = seconds, self.ticks
 
     @property
     def stalled(self) -> bool:
-        """True while programs and data stand still; the joints go to their target."""
+        """True while scripts and data stall; the joints move to their target."""
         passed = (self.ticks - self._stall_from) % STALL_EVERY
         return passed * DT < self.stall
 
     def take(self, values: dict[str, Any]) -> None:
-        """Keep what a client has written, by name, for the next period."""
+        """Store values that a client has written, by name, for the next period."""
         self._pending.append(values)
 
     def step(self, behind: bool = False) -> None:
-        """Run for a period: inputs, script, arm, safety.
+        """Run one period: inputs, script, arm, safety.
 
         Args:
-            behind: True if the clock is ahead, as this process was not served in time.
+            behind: True if this process is behind the clock.
         """
         self.ticks += 1
-        # All that came in a period is latched at its end: the last one counts. A real
-        # controller is never late; what piled up while this one was is taken as it
-        # came, or the arm would be sent on a leap.
+        # All values of a period are latched at its end: the last ones count. A real
+        # controller is never late. Values that accumulated while this one was late are
+        # applied one after the other, as the arm would leap otherwise.
         count = len(self._pending) if not behind else int(self.ticks % SPACING == 0)
         if not self.stalled:
             for values in self._pending[:count]:
@@ -210,7 +209,7 @@ class Controller:
             "safety_status_bits": SAFETY_BITS[arm.safety],
             "safety_mode": int(arm.safety),
             "robot_mode": RUNNING if self.powered else POWER_OFF,
-            # The slider, and what else slows the arm: nothing.
+            # Only the slider slows the arm.
             "speed_scaling": arm.speed_scaling,
             "target_speed_fraction": 1.0,
             "speed_slider_fraction": arm.speed_fraction,

@@ -1,4 +1,4 @@
-"""Dashboard: lines of text on port 29999 by which a controller is looked after."""
+"""Dashboard: the text protocol on port 29999 that operates a controller."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Dashboard:
     """Dashboard of a controller.
 
     Args:
-        controller: Controller that it looks after.
-        play: Function that starts the program at the pendant: External Control.
+        controller: Controller that is operated.
+        play: Function that starts External Control at the pendant.
     """
 
     def __init__(self, controller: Controller, play: Callable[[], None]) -> None:
@@ -81,7 +81,7 @@ class Dashboard:
     async def serve(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
-        """Answer a client until it goes."""
+        """Answer a client until it disconnects."""
         try:
             writer.write(f"{GREETING}\n".encode())
             while line := (await reader.readline()).decode(errors="replace").strip():

@@ -1,4 +1,4 @@
-"""Emulator: a controller at an address, with faults at set times or on demand."""
+"""Emulator of a controller at an address, with faults at set times or on request."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.sim.jit.folders import cache_folder
 
 SCHEDULED = re.compile(r"(\w+)@([\d.]+)s?(?:-([\d.]+)s?)?")
-"""Form of a scheduled fault: NAME@BEGIN or NAME@BEGIN-END, s"""
+"""Pattern of a scheduled fault: NAME@BEGIN or NAME@BEGIN-END, s."""
 
 
 class ScheduledFault(NamedTuple):
@@ -26,16 +26,16 @@ class ScheduledFault(NamedTuple):
 
     name: str
     begin: float
-    """Time after the start, s"""
+    """Time after the start, s."""
     end: float | None
-    """Time after the start at which it is switched off, s; None for never"""
+    """Time after the start at which it is switched off, s; None for never."""
 
     @staticmethod
     def parse(text: str) -> ScheduledFault:
         """Return the fault of a text such as ``silent_robot@3s`` or ``..@3s-5s``.
 
         Raises:
-            ValueError: Another form, or an unknown fault.
+            ValueError: The text has another form, or the fault is unknown.
         """
         found = SCHEDULED.fullmatch(text)
         if not found:
@@ -52,7 +52,7 @@ def parse_version(text: str) -> tuple[int, int, int, int]:
     """Return the version of a text such as ``5.12.2``, with the emulated build.
 
     Raises:
-        ValueError: Another form.
+        ValueError: The text has another form.
     """
     if not re.fullmatch(r"\d+\.\d+\.\d+", text):
         raise ValueError(f"--polyscope: {text!r}; expected a version such as 5.12.2")
@@ -66,7 +66,7 @@ def door_file(address: str) -> Path:
 
 
 def status_of(controller: Controller) -> dict[str, Any]:
-    """Return what a controller does now, for a person or a test."""
+    """Return the present state of a controller, for a person or a test."""
     arm, script = controller.arm, controller.script
     return {
         "safety": arm.safety.name,
@@ -95,7 +95,7 @@ async def serve_emulator(
         ready: Function that is called once clients can connect.
 
     Raises:
-        RuntimeError: A port of the address is taken.
+        RuntimeError: A port of the address is in use.
     """
     loop = asyncio.get_running_loop()
 
@@ -128,7 +128,7 @@ async def serve_emulator(
         while not (controller.ticks or serving.done()):
             await asyncio.sleep(0.01)
         if serving.done():
-            # The door's file may be that of the emulator which has the ports.
+            # The file may be that of the emulator that uses the ports.
             return await serving
         with open_door(answer, door_file(address)):
             ready()

@@ -14,36 +14,36 @@ from marl_airhockey.hardware.ur_emulator.plant import EmptyTable
 from marl_airhockey.hardware.ur_emulator.safety import Safety
 
 RAISED = 0.006
-"""Height of the body under the paddle, m"""
+"""Height of the body under the paddle, m."""
 DELAY = 0.1
-"""Delay of delayed packets, s"""
+"""Delay of delayed packets, s."""
 STALL = 0.08
-"""Time for which a controller without real time does nothing, twice a second, s"""
+"""Time for which a controller without real time does nothing, twice a second, s."""
 EXTRA_MASS, GRAVITY = 1.0, 9.81
-"""Mass that the pendant's payload lacks, kg, and what it is multiplied with, m/s2"""
+"""Mass that is missing in the pendant's payload, kg, and gravity, m/s2."""
 IMPATIENT = 0.04
-"""Time without a command after which an impatient program ends, s"""
+"""Time without a command after which an impatient script ends, s."""
 FIRST_AFTER = 1.0
-"""Time until the first data of a controller whose state comes late, s"""
+"""Time until the first data of a controller with a delayed state, s."""
 CARRIED = 0.3
-"""Angle by which a person turns the base of the arm, rad"""
+"""Angle by which a person turns the base of the arm, rad."""
 LAG = 4.0
-"""Factor on the lag of an arm whose look-ahead is too long"""
+"""Factor on the lag of an arm whose look-ahead is too long."""
 DRIFT = 6.0
-"""Error of a force sensor that drifts, along the base's z, N"""
+"""Error of a force sensor that drifts, along the base's z, N."""
 SLOW = 0.1
-"""Fraction to which somebody turns the speed slider"""
+"""Fraction to which a person turns the speed slider."""
 
 
 class EmulatorFault(NamedTuple):
-    """Fault."""
+    """Fault of a controller or its arm."""
 
     what: str
-    """Description of what happens"""
+    """Description of the fault."""
     switch: Callable[[Controller, bool], None]
-    """Function that switches it on or off"""
+    """Function that switches the fault on or off."""
     source: str = ""
-    """Public report of the fault on a real arm; "" for a fault of the lab's own list"""
+    """Public report of the fault on a real arm; "" for other faults."""
 
 
 def _protective_stop(controller: Controller, on: bool) -> None:
@@ -127,7 +127,7 @@ def _late_state(controller: Controller, on: bool) -> None:
 
 def _carried(controller: Controller, on: bool) -> None:
     if on:
-        # A person who moves the arm stops its program.
+        # A person who moves the arm stops its script.
         controller.script.kill()
         moved = controller.arm.angles + np.array([CARRIED, 0, 0, 0, 0, 0])
         controller.arm.motion = JointLine(moved, 0.5, 2.0)
@@ -145,25 +145,27 @@ FAULTS = {
     "protective_stop": EmulatorFault(
         "the arm stops as after a collision", _protective_stop
     ),
-    "emergency_stop": EmulatorFault("somebody presses the red button", _emergency_stop),
+    "emergency_stop": EmulatorFault(
+        "a person presses the emergency stop", _emergency_stop
+    ),
     "silent_robot": EmulatorFault("the controller sends no more data", _silent),
     "delayed_packets": EmulatorFault(
-        "data of the controller come 0.1 s late", _delayed
+        "data of the controller arrive 0.1 s late", _delayed
     ),
     "dropped_connection": EmulatorFault(
         "RTDE connections are closed, and refused", _dropped
     ),
     "loss_of_real_time": EmulatorFault(
-        "programs and data stall for 80 ms twice a s", _stalled
+        "scripts and data stall for 80 ms twice a second", _stalled
     ),
     "puck_under_paddle": EmulatorFault("the paddle is lifted by 6 mm", _raised),
-    "speed_slider": EmulatorFault("somebody turns the speed slider to 10 %", _slowed),
+    "speed_slider": EmulatorFault("a person turns the speed slider to 10 %", _slowed),
     "local_control": EmulatorFault("the pendant is switched to local control", _local),
     "power_off": EmulatorFault(
         "the arm has no power; its brakes hold it", _powered_off
     ),
     "servo_lag": EmulatorFault(
-        "the arm follows four times as late",
+        "the arm follows with four times the lag",
         _lagging,
         "Universal_Robots_Client_Library issue 86",
     ),
@@ -183,17 +185,17 @@ FAULTS = {
         "Universal_Robots_ROS_Driver issues 191 and 195",
     ),
     "extrapolated_poses": EmulatorFault(
-        "the controller extrapolates poses that come late",
+        "the controller extrapolates poses that arrive late",
         _extrapolated,
         "Universal_Robots_ROS2_Driver issue 534",
     ),
     "speed_check": EmulatorFault(
-        "a pose that calls for a joint above 180 deg/s ends the program",
+        "a pose that needs a joint above 180 deg/s ends the script",
         _checked,
         "Universal_Robots_Client_Library PR 273",
     ),
     "impatient_program": EmulatorFault(
-        "the program ends after 40 ms without a command",
+        "the script ends after 40 ms without a command",
         _impatient,
         "Universal_Robots_Client_Library issue 423",
     ),
@@ -203,14 +205,14 @@ FAULTS = {
         "Universal_Robots_Client_Library PR 384",
     ),
     "late_state": EmulatorFault(
-        "the first data comes 1 s after a client has connected",
+        "the first data arrive 1 s after a client has connected",
         _late_state,
         "ur_modern_driver issue 206",
     ),
     "carried_arm": EmulatorFault(
-        "a person stops the program and moves the arm away",
+        "a person stops the script and moves the arm away",
         _carried,
         "Universal_Robots_ROS2_Driver issue 800",
     ),
 }
-"""Faults by name"""
+"""Faults by name."""

@@ -1,8 +1,8 @@
-"""Arm of a controller in this process, in emulated time.
+"""Arm driver of an emulated arm in this process, in emulated time.
 
-It is the client side of a controller as `hardware.robot.Ur5e` is, without ports,
-threads and clocks: minutes of driving take seconds, and the same calls give the same
-motion. Time passes in `advance`, and in the calls that wait for the controller.
+It is a client of a controller like `hardware.robot.Ur5e`, but without ports, threads
+and clocks. Minutes of motion take seconds, and the same calls give the same motion.
+Time passes in `advance`, and in the calls that wait for the controller.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from marl_airhockey.hardware.ur_emulator.safety import Safety
 from marl_airhockey.types import Array
 
 SCRIPT = "reg_offset_int = 0"
-"""Text by which an emulated controller recognizes a control script"""
+"""Text by which an emulated controller recognizes a control script."""
 FAULTS = {
     Safety.NORMAL: ArmFault.NONE,
     Safety.PROTECTIVE_STOP: ArmFault.PROTECTIVE_STOP,
@@ -37,23 +37,23 @@ def _registers(integers: int, doubles: int) -> list[str]:
 
 SERVO, FORCE = _registers(1, 11), _registers(8, 18)
 REGULAR, NONE = _registers(1, 1), _registers(1, 0)
-"""Registers that commands write"""
+"""Registers that commands write."""
 
 
 class Sample(NamedTuple):
     """Sample of a controller's variables."""
 
     time: float
-    """Time at which it can be read, s"""
+    """Time at which it can be read, s."""
     values: dict[str, Any]
 
 
 class InProcessArm:
-    """Client of a controller, as a `hardware.robot.Arm`.
+    """Arm driver of an emulated arm.
 
     Args:
-        controller: Controller, which nobody else steps.
-        servo: Settings of its loops; None for the usual ones.
+        controller: Controller, which only this object steps.
+        servo: Settings of the control loops; None for the defaults.
     """
 
     def __init__(
@@ -61,13 +61,13 @@ class InProcessArm:
     ) -> None:
         self.controller, self._servo = controller, servo or ServoSettings()
         self.now = 0.0
-        """Emulated time, s"""
+        """Emulated time, s."""
         self._samples: deque[Sample] = deque()
         self._values = controller.values()
         self.connect()
 
     def connect(self) -> None:
-        """Start the program on the controller, as a new client does."""
+        """Start the control script on the controller, as a new client does."""
         self.controller.upload(SCRIPT)
         self._set_watchdog()
 
@@ -86,7 +86,7 @@ class InProcessArm:
         self._command(35, WATCHDOG)
 
     def advance(self, seconds: float) -> None:
-        """Let emulated time pass."""
+        """Advance emulated time."""
         controller = self.controller
         for _ in range(round(seconds / DT)):
             self.now += DT
@@ -128,7 +128,10 @@ class InProcessArm:
         self.advance(4 * DT)
 
     def follow(self, pose: Array, seconds: float) -> bool:
-        """Follow a pose (6,) until the next one ``seconds`` later; False if refused."""
+        """Follow a pose (6,) until the next one ``seconds`` later.
+
+        Return False if the controller rejects it.
+        """
         if not np.isfinite(pose).all() or self._fault():
             return False
         loop = self._servo.look_ahead, self._servo.gain
@@ -136,7 +139,7 @@ class InProcessArm:
         return True
 
     def zero_force_sensor(self) -> None:
-        """Take the present force as zero."""
+        """Zero the force sensor at the present force."""
         self._command(8)
 
     def release(self, pose: Array) -> None:
@@ -151,7 +154,7 @@ class InProcessArm:
         self._command(7)
 
     def unlock(self) -> str:
-        """Release a protective stop; return "" or why that is refused."""
+        """Release a protective stop; return "", or the reason of a failure."""
         if not self.controller.unlock():
             return LOCKED
         self._send(NONE, 0)
@@ -160,5 +163,5 @@ class InProcessArm:
         return ""
 
     def close(self) -> None:
-        """End the program."""
+        """End the control script."""
         self._command(255)

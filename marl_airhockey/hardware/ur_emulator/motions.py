@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from marl_airhockey.types import Array
 
 STOP_DECELERATION = 20.0
-"""Deceleration of the fastest joint in a protective or emergency stop, rad/s2"""
+"""Deceleration of the fastest joint in a protective or emergency stop, rad/s2."""
 
 
 @dataclass
@@ -15,29 +15,29 @@ class Servo:
     """Motion toward joint angles, as `servoL` and `servoJ` command it."""
 
     angles: Array
-    """(6,) target, rad"""
+    """Target (6,) of the joint angles, rad."""
     half_rise: float
-    """Time to 50 % of a step, s"""
+    """Time to 50 % of a step, s."""
 
 
 @dataclass
 class Speed:
-    """Tool velocity without an end, as `speedL` commands it."""
+    """Constant velocity of the tool, as `speedL` commands it."""
 
     twist: Array
-    """(6,) m/s and rad/s"""
+    """Velocity (6,) of the tool, base frame, m/s and rad/s."""
     acceleration: float
-    """m/s2"""
+    """Acceleration of the tool, m/s2."""
 
 
 @dataclass
 class JointSpeed:
-    """Joint velocity without an end, as `speedJ` commands it."""
+    """Constant velocity of the joints, as `speedJ` commands it."""
 
     speeds: Array
-    """(6,) rad/s"""
+    """Velocity (6,) of the joints, rad/s."""
     acceleration: float
-    """rad/s2"""
+    """Acceleration of each joint, rad/s2."""
 
 
 @dataclass
@@ -45,11 +45,11 @@ class Line:
     """Straight line to a pose, as `moveL` commands it."""
 
     pose: Array
-    """(6,)"""
+    """Target pose (6,) of the tool, base frame, m and rad."""
     speed: float
-    """m/s"""
+    """Speed of the tool, m/s."""
     acceleration: float
-    """m/s2"""
+    """Acceleration of the tool, m/s2."""
 
 
 @dataclass
@@ -57,11 +57,11 @@ class JointLine:
     """Straight line in joint space, as `moveJ` commands it."""
 
     angles: Array
-    """(6,) target, rad"""
+    """Target (6,) of the joint angles, rad."""
     speed: float
-    """Speed of the joint with the longest path, rad/s"""
+    """Speed of the joint with the longest path, rad/s."""
     acceleration: float
-    """rad/s2"""
+    """Acceleration of this joint, rad/s2."""
 
 
 @dataclass
@@ -69,7 +69,7 @@ class Halt:
     """Braking to rest."""
 
     deceleration: float = STOP_DECELERATION
-    """Acceleration of the fastest joint, rad/s2"""
+    """Deceleration of the fastest joint, rad/s2."""
 
 
 Motion = Servo | Speed | JointSpeed | Line | JointLine | Halt
@@ -80,8 +80,8 @@ class Force:
     """Compliance along the z axis of a frame."""
 
     frame: Array
-    """(6,) pose, base frame"""
+    """Pose (6,) of the frame, base frame, m and rad."""
     newtons: float
-    """Force along that axis which the arm exerts; below 0 it presses down"""
+    """Force of the arm along that axis, N; below 0 it presses down."""
     speed: float
-    """Largest speed along it, m/s"""
+    """Largest speed along that axis, m/s."""

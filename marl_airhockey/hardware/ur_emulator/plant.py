@@ -1,4 +1,4 @@
-"""Plant: what the tool of an emulated arm touches.
+"""Plant: model of the objects that the tool of an emulated arm touches.
 
 The controller calls its plant once in every period, after the joints have moved.
 """
@@ -14,21 +14,22 @@ import numpy as np
 from marl_airhockey.types import Array
 
 STIFFNESS = 2e4
-"""Stiffness of a table under a paddle that is pressed on it, N/m"""
+"""Stiffness of a table under a paddle that is pressed on it, N/m."""
 
 
 class PlantReading(NamedTuple):
     """Response of a plant to a pose of the tool."""
 
     pose: Array
-    """(6,) measured pose of the tool's centre, base frame: m and rotation vector"""
+    """Measured pose (6,) of the tool's centre, base frame: position, m, and rotation
+    vector, rad."""
     force: Array
-    """(6,) contact force and torque on the tool, base frame: N and Nm"""
+    """Contact force and torque (6,) on the tool, base frame, N and Nm."""
 
 
 Plant = Callable[[Array, Array], PlantReading]
-"""Function from the commanded pose (6,) and velocity (6,) of the tool's centre, base
-frame, to what is measured there"""
+"""Function from the pose (6,) and velocity (6,) of the tool's centre, base frame, to
+the measurements there."""
 
 
 @dataclass
@@ -36,11 +37,11 @@ class EmptyTable:
     """Plant of an arm over an empty table: a stiff plane."""
 
     origin: Array
-    """(3,) point of the plane, base frame, m"""
+    """Point (3,) of the plane, base frame, m."""
     normal: Array
-    """(3,) upward unit vector, base frame"""
+    """Upward unit vector (3,), base frame."""
     raised: float = 0.0
-    """Height of what lies under the paddle, m"""
+    """Height of an object under the paddle, m."""
 
     def __call__(self, pose: Array, velocity: Array) -> PlantReading:
         depth = self.raised - (pose[:3] - self.origin) @ self.normal

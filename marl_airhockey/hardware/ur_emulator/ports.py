@@ -1,6 +1,6 @@
 """Ports of a controller on one loopback address, in real time.
 
-A client cannot choose the ports, so each arm has an address of its own.
+A client cannot choose the ports, so each arm has its own address.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from marl_airhockey.hardware.ur_emulator.state import VERSION_MESSAGE, message, 
 
 DASHBOARD, PRIMARY, SECONDARY, SCRIPT, RTDE = 29999, 30001, 30002, 30003, 30004
 EXTERNAL_CONTROL = 50002
-"""Port of the client from which the program External Control gets its script"""
+"""Port of the client from which External Control gets its script."""
 HOSTS = tuple(f"127.0.0.{last}" for last in range(1, 30))
-"""Addresses of controllers"""
+"""Addresses for controllers."""
 STATE_PERIOD = 0.1
-"""Time between two messages of the state, s"""
+"""Time between two messages of the state, s."""
 LATE = 0.25
-"""Time by which the loop may lag before it gives up what it missed, s"""
+"""Largest lag of the loop, s; after a larger one, missed periods are skipped."""
 BEHIND = 0.006
-"""Delay of a period from which on the controller counts as late, s"""
+"""Delay of a period from which on the controller counts as late, s."""
 PRESS_PLAY = 0.4
-"""Time after which somebody at the pendant starts External Control for a client that
-has uploaded no script, s"""
+"""Time after which External Control is started, as by a person at the pendant, for a
+client that has uploaded no script, s."""
 LONGEST_SCRIPT = 1 << 22
-"""Characters of a script beyond which its client is disconnected"""
+"""Largest number of characters of a script; beyond it, its client is disconnected."""
 Handler = Callable[
     [asyncio.StreamReader, asyncio.StreamWriter], Coroutine[Any, Any, None]
 ]
@@ -47,7 +47,7 @@ class Ports:
     def __init__(self, controller: Controller) -> None:
         self.controller = controller
         self.host = ""
-        """Address at which it is served; "" before"""
+        """Address at which it is served; "" before."""
         self._clients: set[RtdeConnection] = set()
         self._owners: dict[str, RtdeConnection] = {}
         self._client_host = "127.0.0.1"
@@ -68,14 +68,14 @@ class Ports:
             hosts: Addresses to try, in this order.
 
         Raises:
-            RuntimeError: There is none.
+            RuntimeError: No address is free.
         """
         servers: list[asyncio.Server] = []
         for host in hosts:
             try:
                 for port, handler in self._handlers.items():
                     servers.append(await asyncio.start_server(handler, host, port))
-            except OSError:  # Another lab's, or another controller's.
+            except OSError:  # Used by another lab or another controller.
                 _close(servers)
                 continue
             self.host = host
@@ -129,7 +129,7 @@ class Ports:
             self._clients.discard(client)
 
     def _client_started(self, host: str) -> None:
-        """Have somebody start External Control, if the client uploads no script."""
+        """Start External Control after a while, if the client uploads no script."""
         self._client_host = host
         self._start(self._press_play_after(PRESS_PLAY))
 
@@ -147,11 +147,11 @@ class Ports:
         task.add_done_callback(self._tasks.discard)
 
     async def _fetch_script(self) -> None:
-        """Do what the program External Control does: get a script from the client."""
+        """Get a script from the client, as External Control does."""
         address = self._client_host, EXTERNAL_CONTROL
         try:
             reader, writer = await asyncio.open_connection(*address)
-        except OSError:  # The client serves none: it uploads its script, or has gone.
+        except OSError:  # The client serves no script: it uploads it, or has ended.
             return
         try:
             writer.write(b"request_program\n")

@@ -1,4 +1,4 @@
-"""Poses of a client's `servoL`, and how faulty scripts treat those that come late."""
+"""Poses of a client's `servoL`, and faults in the handling of late poses."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from marl_airhockey.hardware.ur_emulator.arm import DT, JOINT_SPEED
 from marl_airhockey.types import Array
 
 PERIOD = 0.008
-"""Time between two poses of a client, s"""
+"""Time between two poses of a client, s."""
 LATE, EXTRAPOLATED = 0.01, 0.2
-"""Times after the last command between which poses are extrapolated, s"""
+"""Times after the last command between which poses are extrapolated, s."""
 
 
 class Poses:
@@ -18,17 +18,17 @@ class Poses:
 
     def __init__(self) -> None:
         self.extrapolates = False
-        """True if a pose that comes late is extrapolated, a fault"""
+        """True if a pose that arrives late is extrapolated, a fault."""
         self.checks_speed = False
-        """True if a pose that calls for too fast joints ends the script, a fault"""
+        """True if a pose that requires too fast joints ends the script, a fault."""
         self._newest, self._last = np.zeros(6), np.zeros(6)
 
     def take(self, pose: Array, silence: float) -> Array:
         """Return the pose (6,) to follow.
 
         Args:
-            pose: (6,) newest pose.
-            silence: Time since it came, s.
+            pose: Newest pose (6,), base frame, m and rad.
+            silence: Time since the newest pose arrived, s.
         """
         if (pose != self._newest).any():
             self._last, self._newest = self._newest, pose
@@ -36,12 +36,12 @@ class Poses:
         return pose + late * (pose - self._last) * (silence - LATE) / PERIOD
 
     def too_fast(self, before: Array, after: Array, silence: float) -> bool:
-        """Return True if a script that checks speeds refuses new joint angles.
+        """Return True if a script that checks speeds rejects new joint angles.
 
         Args:
-            before: (6,) angles of the last pose, rad.
-            after: (6,) angles of the newest pose, rad.
-            silence: Time since it came, s.
+            before: Angles (6,) of the last pose, rad.
+            after: Angles (6,) of the newest pose, rad.
+            silence: Time since the newest pose arrived, s.
         """
         speed = float(np.abs(after - before).max()) / PERIOD
         return self.checks_speed and silence <= DT and speed > JOINT_SPEED

@@ -1,6 +1,7 @@
-"""Real-time data exchange: the protocol of port 30004, version 2.
+"""Real-time data exchange (RTDE): the protocol of port 30004, version 2.
 
-A package is a big-endian size (2 bytes, of all of it), a type (1 byte) and a body.
+A package consists of its size in bytes (2 bytes, big-endian), its type (1 byte) and a
+body.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ FORMATS = {
     "VECTOR6D": "6d",
     "VECTOR6INT32": "6i",
 }
-"""Format of `struct` by the name of a type"""
+"""Format of `struct` by the name of a type."""
 UNKNOWN, TAKEN = "NOT_FOUND", "IN_USE"
-"""Types of a name that there is not, and of an input that another client writes"""
+"""Types of an unknown name, and of an input that another client writes."""
 Types = dict[str, str]
-"""Types of variables by their names"""
+"""Types of variables by their names."""
 
 
 def _types(names: dict[str, str], **registers: str) -> Types:
@@ -72,7 +73,7 @@ OUTPUTS = _types(
     output_double_register="DOUBLE",
     input_double_register="DOUBLE",
 )
-"""Types of the variables that a controller sends"""
+"""Types of the variables that a controller sends."""
 INPUTS = _types(
     {
         "UINT32": """speed_slider_mask input_bit_registers0_to_31
@@ -89,31 +90,31 @@ INPUTS = _types(
     input_int_register="INT32",
     input_double_register="DOUBLE",
 )
-"""Types of the variables that a client may write"""
+"""Types of the variables that a client may write."""
 
 
 class Recipe:
-    """List of variables that a package of data holds, one after the other.
+    """List of the variables in a data package, in their order.
 
     Args:
         text: Names of the variables, separated by commas.
-        known: Types of the variables that there are.
+        known: Types of all variables, by name.
 
     Raises:
-        UnicodeDecodeError: The text is no text.
+        UnicodeDecodeError: The names are not UTF-8 text.
     """
 
     def __init__(self, text: bytes, known: Types) -> None:
         self.names = [name for name in text.decode().split(",") if name]
         self.types = [known.get(name, UNKNOWN) for name in self.names]
         self.known = UNKNOWN not in self.types
-        """True if there are all of them."""
+        """True if all variables are known."""
         formats = [FORMATS[kind] for kind in self.types] if self.known else []
         self._format = struct.Struct(">" + "".join(formats))
         self._sizes = [int(f[0]) if len(f) > 1 else 1 for f in formats]
 
     def pack(self, values: dict[str, Any]) -> bytes:
-        """Write values by name; those that are missing are 0."""
+        """Return the bytes of values by name; missing values are 0."""
         numbers: list[Any] = []
         for name, size in zip(self.names, self._sizes, strict=True):
             value = values.get(name, 0)
@@ -126,10 +127,10 @@ class Recipe:
         return self._format.pack(*numbers)
 
     def unpack(self, body: bytes) -> dict[str, Any]:
-        """Read values by name.
+        """Return the values by name.
 
         Raises:
-            struct.error: another length.
+            struct.error: The body has another length.
         """
         numbers = iter(self._format.unpack(body))
         return {

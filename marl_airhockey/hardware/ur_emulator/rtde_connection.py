@@ -1,6 +1,6 @@
 """Connection of one client of real-time data exchange (RTDE).
 
-Whatever a client sends, only its own connection suffers.
+Invalid data from a client affects only its own connection.
 """
 
 from __future__ import annotations
@@ -22,20 +22,21 @@ from marl_airhockey.hardware.ur_emulator.rtde import (
 )
 
 BACKLOG = 1 << 16
-"""Bytes that wait for a slow reader; beyond, packages are dropped, as they are late"""
+"""Largest number of bytes that wait for a slow reader; beyond it, packages, which would
+be late, are dropped."""
 RATES = 1.0, 1.0 / DT
-"""Least and largest rate at which a client may ask for data, Hz"""
+"""Least and largest rate of data that a client may request, Hz."""
 OLD_RATE = 125.0
-"""Rate of a client of version 1, which cannot choose one, Hz"""
+"""Rate of a client of version 1, which cannot choose one, Hz."""
 HEADER = 3
-"""Bytes of the size and the type of a package"""
+"""Number of bytes of the size and the type of a package."""
 
 
 class RtdeConnection:
     """Connection of one client that exchanges data.
 
     Args:
-        controller: Controller that it writes to.
+        controller: Controller that receives the inputs.
         reader: Stream from the client.
         writer: Stream to the client.
         owners: Connection that writes each input, by the input's name.
@@ -56,7 +57,7 @@ class RtdeConnection:
         self._outputs, self._every = Recipe(b"", OUTPUTS), 1
         self._version, self._refused, self._from = 1, False, 0.0
         self.streams = False
-        """True if the client wants data now"""
+        """True while the client requests data."""
         version = struct.pack(">4I", *controller.version)
         self._answers: dict[int, Callable[[bytes], bytes]] = {
             ord("V"): self._set_version,
@@ -68,7 +69,7 @@ class RtdeConnection:
         }
 
     async def serve(self) -> None:
-        """Answer until the client goes, or sends what is no package."""
+        """Answer until the client disconnects, or sends an invalid package."""
         try:
             while True:
                 size, kind = struct.unpack(
@@ -95,8 +96,8 @@ class RtdeConnection:
         """Answer a package.
 
         Raises:
-            ValueError: It is malformed.
-            struct.error: It has another length.
+            ValueError: The package is malformed.
+            struct.error: The body has another length.
         """
         if kind in self._answers:
             self._writer.write(package(kind, self._answers[kind](body)))
@@ -115,7 +116,7 @@ class RtdeConnection:
         self._writer.close()
 
     def send(self, tick: int, values: dict[str, Any]) -> None:
-        """Send the variables, if it is their turn and the client keeps up."""
+        """Send the variables if they are due and the client is fast enough."""
         waiting = self._writer.transport.get_write_buffer_size()
         ready = self.streams and self._controller.time >= self._from
         if ready and tick % self._every == 0 and waiting < BACKLOG:

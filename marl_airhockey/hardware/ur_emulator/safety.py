@@ -1,4 +1,4 @@
-"""Safety: the safety modes of a controller, as its protocol numbers them."""
+"""Safety modes of a controller, with the numbers of its protocol."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Safety(IntEnum):
-    """Safety mode, as the controller's protocol numbers it."""
+    """Safety mode, with its number in the controller's protocol."""
 
     NORMAL = 1
     PROTECTIVE_STOP = 3
@@ -18,4 +18,4 @@ SAFETY_BITS = {
     Safety.PROTECTIVE_STOP: 1 << 2,
     Safety.ROBOT_EMERGENCY_STOP: (1 << 6) | (1 << 7),
 }
-"""Bits of ``safety_status_bits``"""
+"""Bits of ``safety_status_bits``."""

@@ -1,8 +1,8 @@
-"""Control script: the registers by which a client of ur_rtde moves the arm.
+"""Control script of ur_rtde: registers by which a client moves the arm.
 
-The client uploads a script of URScript and then writes a command's number and its
-arguments into input registers. The script itself is not interpreted here: what it does
-with the registers is done by `ControlScript`, once in every period of the controller.
+The client uploads a script in URScript and then writes a command's number and its
+arguments into input registers. The script itself is not interpreted. `ControlScript`
+processes the registers in its place, once in every period of the controller.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from marl_airhockey.hardware.ur_emulator.safety import Safety
 from marl_airhockey.types import Array
 
 READY, DONE = 1, 2
-"""Values of the output register 0"""
+"""Values of the output register 0."""
 EXIT = 255
-"""Number of the command that ends the script"""
+"""Number of the command that ends the script."""
 DEAD_TIME = 0.004
-"""Part of the half-rise of `servoL` that no look-ahead explains: of 34 ms at a
-look-ahead of 0.03 s on the arm's relatives, s"""
+"""Part of the half-rise time of `servoL` that the look-ahead does not explain, s;
+related arms have a half-rise time of 34 ms at a look-ahead of 0.03 s."""
 LOOK_AHEAD = 0.03, 0.2
-"""Least and largest look-ahead that `servoL` takes, s"""
+"""Least and largest look-ahead that `servoL` accepts, s."""
 LARGEST = 1e6
-"""Largest argument of a command that makes sense"""
+"""Largest valid argument of a command."""
 Waiting = Generator[None, None, None]
-"""Command that takes several periods"""
+"""Command that takes several periods."""
 
 
 class ScriptError(Exception):
@@ -52,7 +52,7 @@ class ControlScript:
     """Script of a client that runs on the controller.
 
     Args:
-        arm: Arm that it moves.
+        arm: Arm that is moved.
     """
 
     def __init__(self, arm: EmulatedArm) -> None:
@@ -60,19 +60,18 @@ class ControlScript:
         self.inputs_int, self.inputs_double = [0] * 48, np.zeros(48)
         self.outputs_int, self.outputs_double = [0] * 48, np.zeros(48)
         self.counts: Counter[int] = Counter()
-        """Number of times that each command was run."""
+        """Number of runs of each command."""
         self.silence = 0.0
-        """Time since the last write of a command's number, s, in periods of the
-        controller: a real one is always served, and what this one sleeps through is no
-        silence of its client's."""
+        """Time since the last write of a command's number, s. It counts periods of the
+        controller, so that a delay of this process is not a silence of the client."""
         self.offset = 0
         """First of the registers that the script uses: 0, or 24 for the upper range."""
         self.poses = Poses()
         self.longest_silence = math.inf
-        """Time without a command that ends the script, whatever its watchdog, s"""
+        """Time without a command that ends the script with any watchdog, s."""
         self._run: Waiting | None = None
         self._watchdog = 0.0
-        """Least rate of commands, Hz; 0 without a watchdog"""
+        """Least rate of commands, Hz; 0 without a watchdog."""
         # Commands that are not acknowledged.
         self._real_time: dict[int, Callable[[], None]] = {
             6: self._force_mode,
@@ -115,20 +114,20 @@ class ControlScript:
         """Run the script that was uploaded.
 
         Args:
-            offset: First of its registers.
+            offset: First register of the script.
         """
         self.offset = offset
         self._run, self._watchdog = self._loop(), 0.0
 
     def kill(self) -> None:
-        """End the script; the arm brakes. Its registers keep what they hold."""
+        """End the script; the arm brakes, and the registers keep their values."""
         if self.running:
             self._run, self._watchdog = None, 0.0
             self._reply(0)
             self.arm.motion, self.arm.force = Halt(), None
 
     def step(self) -> None:
-        """Run for a period of the controller."""
+        """Run one period of the controller."""
         self.silence += DT
         patience = 1.0 / self._watchdog if self._watchdog else math.inf
         if self.silence > min(patience, self.longest_silence):
@@ -137,7 +136,7 @@ class ControlScript:
             try:
                 next(self._run)
             except (StopIteration, ScriptError):
-                # An error ends a script; its client is not told.
+                # An error ends a script; its client gets no message.
                 self.kill()
 
     def _loop(self) -> Waiting:
@@ -192,7 +191,7 @@ class ControlScript:
         solved = self.arm.servo(pose, self._half_rise)
         fast = self.poses.too_fast(before, self.arm.target, self.silence)
         if not solved or (following and fast):
-            # get_inverse_kin raises and ends the script; the client is not told.
+            # get_inverse_kin raises and ends the script; the client gets no message.
             self.kill()
 
     def _servo_joints(self) -> None:
@@ -285,7 +284,7 @@ def _checked(arguments: Array) -> Array:
     """Return the arguments of a command.
 
     Raises:
-        ScriptError: One is not finite, or is too large to make sense.
+        ScriptError: An argument is not finite, or is larger than `LARGEST`.
     """
     if not (np.abs(arguments) <= LARGEST).all():
         raise ScriptError(f"arguments {arguments}; expected finite numbers")

@@ -1,4 +1,4 @@
-"""State of an arm as its controller tells it to whoever listens, ten times a second."""
+"""State of an arm, which its controller sends to every client ten times a second."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from marl_airhockey.hardware.ur_emulator.arm import (
 )
 
 VERSION_MESSAGE = 20
-"""Number of the first message, whose contents nobody reads here"""
+"""Number of the first message, whose contents are not used here."""
 FARTHEST = 2 * np.pi
-"""Angle that each joint reaches to either side, rad"""
+"""Angle that each joint reaches to either side, rad."""
 
 
 def message(kind: int, body: bytes) -> bytes:
@@ -32,7 +32,7 @@ def message(kind: int, body: bytes) -> bytes:
 
 
 def state_of(arm: EmulatedArm) -> bytes:
-    """Return the message of an arm: its joints and what they may."""
+    """Return the message with the joints of an arm and their limits."""
     joints = [
         JOINT.pack(angle, aim, speed, 0.0, 0.0, 0.0, 0.0, 253)
         for angle, aim, speed in zip(arm.angles, arm.target, arm.speeds, strict=True)

@@ -1,4 +1,4 @@
-"""Vision: the position of a puck from the frames of a calibrated camera."""
+"""Position of a puck from the frames of a calibrated camera."""
 
 from marl_airhockey.hardware.vision.colour import Colour
 from marl_airhockey.hardware.vision.detector import Detector, Sighting

@@ -1,4 +1,4 @@
-"""Calibration: a camera's view of a table from printed tags or from clicks."""
+"""Calibration of a camera's view of a table by printed tags or by clicks."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from marl_airhockey.hardware.vision.lens import CameraView, Lens
 from marl_airhockey.types import Array
 
 TAGS = cv2.aruco.DICT_4X4_50
-"""Dictionary of the printed tags"""
+"""Dictionary of the printed tags."""
 TAG = 0.08
-"""Width of a printed tag's black square, m"""
+"""Width of a printed tag's black square, m."""
 LEAST_TAGS = 4
-"""Least number of tags that must be seen"""
+"""Least number of tags that must be seen."""
 WORST = 2.0
-"""Largest accepted error of a calibration's fit, px"""
+"""Largest accepted error of a calibration's fit, px."""
 MOVED = 2.0
-"""Error of the tags, px, above which the camera or the table has moved"""
+"""Error of the tags, px, above which the camera or the table has moved."""
 SHIFTED = 0.002
-"""Mean shift of the tags on the table above which it has, m. Without a movement it is
-below 0.3 mm in the virtual lab."""
+"""Mean shift of the tags on the table above which the camera or the table has moved, m.
+Without a movement it is below 0.3 mm in the virtual lab."""
 DARK = 40.0
-"""Mean brightness of a frame, of 255, below which it is dark"""
+"""Mean brightness of a frame, of 255, below which it is dark."""
 
 
 def tag_corners(place: Array) -> Array:
     """Return the corners (4, 2) of an upright tag in the order of `find_tags`, m.
 
     Args:
-        place: (2,) position of its centre, table frame, m.
+        place: Position (2,) of the tag's centre, table frame, m.
     """
     half = TAG / 2
     around = np.array([(-half, half), (half, half), (half, -half), (-half, -half)])
@@ -63,7 +63,7 @@ def view_from_tags(
         lens: Lens of the camera.
 
     Raises:
-        ValueError: Too few tags, or corners that no view fits.
+        ValueError: There are too few tags, or no view fits the corners.
     """
     both = sorted(seen.keys() & known.keys())
     if len(both) < LEAST_TAGS:
@@ -80,15 +80,15 @@ def view_from_clicks(pixels: Array, places: Array, lens: Lens) -> CameraView:
     """Fit a view to at least four clicked points.
 
     Args:
-        pixels: (n, 2) clicked points, px.
-        places: (n, 2) positions of these points, table frame, m.
+        pixels: Clicked points (n, 2), px.
+        places: Positions (n, 2) of these points, table frame, m.
         lens: Lens of the camera.
 
     Raises:
-        ValueError: Fewer than four points, or points that no view fits.
+        ValueError: There are fewer than four points, or no view fits them.
     """
     if len(pixels) < 4 or len(pixels) != len(places):
-        raise ValueError(f"{len(pixels)} points: click at least four, in order")
+        raise ValueError(f"{len(pixels)} points; click at least four, in order")
     return _view(np.asarray(pixels, float), np.asarray(places, float), lens)
 
 
@@ -118,7 +118,7 @@ def _view(pixels: Array, positions: Array, lens: Lens) -> CameraView:
 def view_trouble(
     view: CameraView, pictures: Sequence[Array], known: Mapping[int, Array]
 ) -> str:
-    """Return why frames do not fit a calibration; "" if they do.
+    """Return the reason why frames do not fit a calibration; "" if they do.
 
     Args:
         view: View of the calibration.
@@ -129,7 +129,7 @@ def view_trouble(
     height, width = pictures[0].shape[:2]
     if (width, height) != tuple(view.lens.size):
         return (
-            f"its pictures are {width} x {height}, those of the calibrated camera "
+            f"its images are {width} x {height}, those of the calibrated camera "
             f"{view.lens.size[0]} x {view.lens.size[1]}; set that size, or calibrate "
             "again"
         )
@@ -140,7 +140,7 @@ def view_trouble(
     seen = [error for error in off if np.isfinite(error)]
     if not seen:
         light = float(np.mean([picture.mean() for picture in pictures]))
-        dark = f", and the picture is dark (mean {light:.0f} of 255)"
+        dark = f", and the image is dark (mean {light:.0f} of 255)"
         return (
             f"none of the table's tags is seen{dark if light < DARK else ''}; is this "
             "the camera over the table, are the lights on, is the lens uncovered?"

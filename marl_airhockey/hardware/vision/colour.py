@@ -1,4 +1,4 @@
-"""Colour: a range of colours, such as that of a puck, and its pixels in a frame."""
+"""Range of colours, such as that of a puck, and its pixels in a frame."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from marl_airhockey.sim.core.checks import check_fields
 from marl_airhockey.types import Array
 
 HUES = 180
-"""Number of hues of OpenCV in 8 bits"""
+"""Number of hues of OpenCV in 8 bits."""
 FAINT = 0.2
-"""Share of the largest amount of a colour below which a pixel does not count"""
+"""Share of the largest amount of a colour below which a pixel does not count."""
 
 
 @dataclass(frozen=True)
@@ -26,13 +26,13 @@ class Colour:
     """
 
     hue: float
-    """Centre of the range, 0 .. 180; red is at both ends"""
+    """Centre of the range, 0 .. 180; red is at both ends."""
     width: float = 10.0
-    """Half-width of the range of hues"""
+    """Half-width of the range of hues."""
     saturation: int = 100
-    """Least saturation, 0 .. 255"""
+    """Least saturation, 0 .. 255."""
     brightness: int = 60
-    """Least brightness, 0 .. 255"""
+    """Least brightness, 0 .. 255."""
 
     def __post_init__(self) -> None:
         byte = (0, 255)
@@ -41,7 +41,7 @@ class Colour:
         )
 
     def mask(self, image: Array) -> Array:
-        """Return (H, W) uint8, 255 where an image (H, W, 3) has this colour."""
+        """Return a mask (H, W) uint8, 255 where an image (H, W, 3) has this colour."""
         hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
         least = (self.saturation, self.brightness)
         low, high = round(self.hue - self.width), round(self.hue + self.width)
@@ -55,7 +55,7 @@ class Colour:
 
     @cached_property
     def _axis(self) -> Array:
-        """(3,) blue, green, red: unit direction of this hue, orthogonal to grey."""
+        """Unit direction (3,) of this hue, orthogonal to grey: blue, green, red."""
         pure = np.array([[[round(self.hue) % HUES, 255, 255]]], np.uint8)
         blue, green, red = cv2.cvtColor(pure, cv2.COLOR_HSV2BGR)[0, 0].astype(float)
         axis = np.array([blue, green, red])
@@ -92,7 +92,7 @@ class Colour:
         part = image[max(y - radius, 0) : y + radius + 1, max(x - radius, 0) :]
         part = np.ascontiguousarray(part[:, : 2 * radius + 1])
         if not part.size:
-            raise ValueError(f"pixel {pixel}: outside of the picture")
+            raise ValueError(f"pixel {pixel}: outside of the image")
         hsv = cv2.cvtColor(part, cv2.COLOR_BGR2HSV).reshape(-1, 3).astype(float)
         angles = hsv[:, 0] * (2 * np.pi / HUES)
         mean = np.angle(np.exp(1j * angles).mean()) * HUES / (2 * np.pi) % HUES

@@ -1,4 +1,4 @@
-"""Detector: the position of a puck, or of a paddle's top, in one frame."""
+"""Detection of a puck, or of a paddle's top, in one frame."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from marl_airhockey.hardware.vision.lens import CameraView
 from marl_airhockey.types import Array
 
 LEAST, MOST = 0.35, 1.8
-"""Range of an area that may be a puck, as shares of a whole puck's area"""
+"""Range of an area that may be a puck, as shares of a whole puck's area."""
 WHOLE = 0.93
-"""Share above which a puck counts as not hidden"""
+"""Share above which a puck counts as not hidden."""
 RIM = 2
-"""Margin around an area of the colour, px, in which there may be more of it"""
+"""Margin around an area of the colour, px, in which there may be more of it."""
 ROUND = 0.12
-"""Largest distance of a point of a puck's edge from a fitted circle, in radii"""
+"""Largest distance of a point of a puck's edge from a fitted circle, in radii."""
 
 
 class Sighting(NamedTuple):
-    """Puck, or paddle's top, in one frame."""
+    """Detected puck, or paddle's top, in one frame."""
 
     place: Array
-    """(2,) position, table frame, m"""
+    """Position (2,), table frame, m."""
     taken: float
-    """Time at which its row was exposed, monotonic clock, s"""
+    """Time at which the row of its centre was exposed, monotonic clock, s."""
     share: float
-    """Visible share of the disc"""
+    """Visible share of the disc."""
     pixel: Array
-    """(2,) centre of the disc, px"""
+    """Centre (2,) of the disc, px."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +45,14 @@ class Detector:
     view: CameraView
     colour: Colour
     radius: float
-    """Radius of the disc, m"""
+    """Radius of the disc, m."""
     extent: tuple[float, float]
-    """Half of the table's length and width, m; the search is limited to the table"""
+    """Half of the table's length and width, m; the search is limited to the table."""
     height: float = 0.003
-    """Height of the disc's rim above the table, m"""
+    """Height of the disc's rim above the table, m."""
     readout: float = 0.0
-    """Time from the exposure of the first row to that of the last, s, for a camera with
-    a rolling shutter"""
+    """Time between the exposures of the first and the last row, s, for a camera with a
+    rolling shutter."""
 
     def find(self, frame: CameraFrame) -> Sighting | None:
         """Return the largest disc of the colour; None without one."""

@@ -1,4 +1,4 @@
-"""Edges: clicked corners of a table, refined by the edges between them."""
+"""Refinement of clicked corners of a table by the edges between them."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from marl_airhockey.hardware.vision.lens import Lens
 from marl_airhockey.types import Array
 
 SAMPLES = 80
-"""Number of points along an edge at which it is searched"""
+"""Number of points along an edge at which it is searched."""
 ACROSS = 6.0
-"""Largest distance of the search from the clicked line, px"""
+"""Largest distance of the search from the clicked line, px."""
 FINE = 0.25
-"""Distance between two samples of the search, px"""
+"""Distance between two samples of the search, px."""
 BORDER = 0.04
-"""Share of an edge at either end that is left out, as corners are round"""
+"""Share of an edge at either end that is ignored, as corners are round."""
 OUTLIER = 1.0
-"""Least distance from a line, px, at which a point may be an outlier"""
+"""Least distance from a line, px, at which a point may be an outlier."""
 FEWEST = 20
-"""Least number of points on a line"""
+"""Least number of points on a line."""
 
 
 def refine_corners(image: Array, clicks: Array, lens: Lens) -> Array:
@@ -27,11 +27,11 @@ def refine_corners(image: Array, clicks: Array, lens: Lens) -> Array:
 
     Args:
         image: Image (H, W, 3) uint8, blue, green, red.
-        clicks: (n, 2) clicked corners, px, in order around the table.
+        clicks: Clicked corners (n, 2), px, in order around the table.
         lens: Lens of the camera.
 
     Raises:
-        ValueError: An edge is not seen; the message names its corners.
+        ValueError: An edge is not seen. The message gives its corners.
     """
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     smooth = cv2.GaussianBlur(grey, (0, 0), 1.0).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Lens and view: from points above a table to pixels, and back.
+"""Lens and view of a camera, which convert points above a table to pixels and back.
 
 Only points are transformed, not images, which is as exact and takes microseconds.
 """
@@ -20,17 +20,17 @@ class Lens:
     """Lens of a camera.
 
     Raises:
-        ValueError: A field is wrong, or the matrix is no camera's.
+        ValueError: A field is wrong, or the matrix is not that of a camera.
     """
 
     matrix: tuple[tuple[float, float, float], ...]
-    """(3, 3) camera matrix, px"""
+    """Camera matrix (3, 3), px."""
     distortion: tuple[float, ...]
-    """Coefficients in OpenCV's order: k1, k2, p1, p2, k3"""
+    """Coefficients in OpenCV's order: k1, k2, p1, p2, k3."""
     size: tuple[int, int]
-    """Width and height of the frames, px"""
+    """Width and height of the frames, px."""
     residual: float = 0.0
-    """Root mean square error of the calibration, px"""
+    """Root mean square error of the calibration, px."""
 
     def __post_init__(self) -> None:
         check_fields(self, size=(16, 16384), distortion=(-1e3, 1e3), residual=(0, 100))
@@ -57,11 +57,11 @@ class CameraView:
 
     lens: Lens
     rotation: tuple[float, float, float]
-    """Rotation vector from the table frame to the camera frame, rad"""
+    """Rotation vector from the table frame to the camera frame, rad."""
     translation: tuple[float, float, float]
-    """Table's centre, camera frame, m"""
+    """Centre of the table, camera frame, m."""
     residual: float = 0.0
-    """Root mean square error of the calibration, px"""
+    """Root mean square error of the calibration, px."""
 
     def __post_init__(self) -> None:
         check_fields(self, rotation=(-10, 10), translation=(-20, 20), residual=(0, 100))
@@ -78,7 +78,7 @@ class CameraView:
 
     @cached_property
     def centre(self) -> Array:
-        """(3,) position of the camera, table frame, m."""
+        """Position (3,) of the camera, table frame, m."""
         rotation, translation = self._pose
         return np.asarray(-rotation.T @ translation)
 
@@ -96,7 +96,7 @@ class CameraView:
         """Return the positions (n, 2), m, of pixels (n, 2) at a height above the table.
 
         Args:
-            pixels: (n, 2) px.
+            pixels: Pixels (n, 2), px.
             height: Height above the table, m.
         """
         flat = np.asarray(pixels, float).reshape(-1, 1, 2)
@@ -107,7 +107,7 @@ class CameraView:
         return np.asarray(self.centre[:2] + steps[:, None] * directions[:, :2])
 
     def scale(self, place: Array, height: float = 0.0) -> float:
-        """Return the scale of the image at a position (2,), table frame, m, px/m."""
+        """Return the scale of the image, px/m, at a position (2,), table frame, m."""
         x, y = place
         ends = [[x, y, height], [x + 0.01, y, height], [x, y + 0.01, height]]
         here, ahead, aside = self.project(np.array(ends))

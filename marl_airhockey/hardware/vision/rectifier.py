@@ -1,4 +1,4 @@
-"""Rectifier: a camera frame as if it had been taken from straight above."""
+"""Rectification of camera frames to a view from straight above."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from marl_airhockey.hardware.vision.lens import CameraView
 from marl_airhockey.types import Array
 
 MARGIN = 0.05
-"""Width of the margin around the table, m"""
+"""Width of the margin around the table, m."""
 
 
 class Rectifier:
@@ -17,7 +17,7 @@ class Rectifier:
 
     Args:
         view: View of the camera.
-        size: (2,) length and width of the table, m.
+        size: Length and width (2,) of the table, m.
     """
 
     def __init__(self, view: CameraView, size: Array) -> None:
@@ -30,7 +30,7 @@ class Rectifier:
         return -self._half, self._half.copy()
 
     def rectify(self, image: Array, width: int) -> Array:
-        """Return (h, width, 3) uint8, to scale for points on the table's surface.
+        """Return an image (h, width, 3) uint8, to scale on the table's surface.
 
         Args:
             image: Image (H, W, 3) uint8 of the camera.

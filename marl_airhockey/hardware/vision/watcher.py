@@ -1,4 +1,4 @@
-"""Watcher: a thread that searches every frame of a camera for a disc."""
+"""Thread that searches every frame of a camera for a disc."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from marl_airhockey.hardware.vision.detector import Detector, Sighting
 from marl_airhockey.types import Array
 
 STUCK = 0.3
-"""Time without a new picture after which a camera is stuck, s"""
+"""Time without a new frame after which a camera is stuck, s."""
 RECENT, REPEATS = 20, 5
-"""Number of recent frames, and of repeats among them that are too many"""
+"""Number of recent frames, and least number of repeats among them that is a fault."""
 KEPT = 256
-"""Largest number of sightings that are kept until `Watcher.take`"""
+"""Largest number of sightings that are stored until `Watcher.take`."""
 
 
 class Watcher:
@@ -48,21 +48,21 @@ class Watcher:
 
     @property
     def trouble(self) -> str:
-        """Reason why the camera's pictures are no news; "" if they are."""
+        """Reason why the camera's frames contain nothing new; "" if they do."""
         recent = [*self._repeats]
         same = time.monotonic() - self._changed_at
         if not any(recent):
             return ""
         if all(recent[-REPEATS:]):
-            return f"camera: the same picture for {same:.1f} s" if same > STUCK else ""
+            return f"camera: the same frame for {same:.1f} s" if same > STUCK else ""
         if sum(recent) >= REPEATS:
             return (
-                f"camera: {sum(recent)} of {len(recent)} pictures repeat the one before"
+                f"camera: {sum(recent)} of {len(recent)} frames repeat the one before"
             )
         return ""
 
     def _is_repeated(self, image: Array) -> bool:
-        """Return True if an image is the one before: noise changes every real one."""
+        """Return True if a frame equals the previous one; real frames have noise."""
         same = np.array_equal(image, self._image)
         self._image = image
         self._repeats.append(same)
@@ -77,7 +77,7 @@ class Watcher:
             if frame is None:
                 continue
             number, began = frame.number, time.thread_time()
-            # A puck that did not move since would seem to have stopped.
+            # With a repeated frame, the puck would seem to have stopped.
             repeated = self._is_repeated(frame.image)
             seen = None if repeated else self._detector.find(frame)
             self.seconds += time.thread_time() - began

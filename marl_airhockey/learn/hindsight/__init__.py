@@ -1,1 +1,1 @@
-"""Learning by playing towards goals, those that were met by chance among them."""
+"""Learning of goals in simulation, with hindsight experience replay."""

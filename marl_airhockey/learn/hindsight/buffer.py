@@ -9,12 +9,12 @@ from stable_baselines3.common.type_aliases import DictReplayBufferSamples
 
 
 class GoalEndsReplayBuffer(HerReplayBuffer):
-    """Buffer for tasks that end when their goal is met, with a reward of 1.
+    """Buffer for tasks that end with a reward of 1 when their goal is met.
 
-    stable-baselines3 gives a relabelled step the termination that was recorded, which
-    is that of the former goal: steps that meet the new goal would be bootstrapped, and
-    steps that met the former one would not. Here a relabelled step is terminated if,
-    and only if, it meets its new goal.
+    In the buffer of stable-baselines3 a relabelled step keeps the recorded termination,
+    which belongs to the former goal. Steps that meet the new goal would be
+    bootstrapped, and steps that met the former goal would not. In this buffer a
+    relabelled step is terminated if, and only if, it meets its new goal.
     """
 
     def _get_virtual_samples(self, *args: Any) -> DictReplayBufferSamples:

@@ -1,9 +1,8 @@
 """Soft actor-critic of stable-baselines3 with hindsight goals, over B worlds.
 
-Haarnoja et al. (2018); Andrychowicz et al. (2017); with quantile critics, TQC of
-sb3-contrib, Kuznetsov et al. (2020). A step of an episode is learned from
-with the goal that it had and with goals that the episode came to later; the rewards of
-those are computed anew.
+See Haarnoja et al. (2018) and Andrychowicz et al. (2017). With quantile critics the
+algorithm is TQC of sb3-contrib (Kuznetsov et al., 2020). Each step is learned with its
+goal and with goals that its episode reached later, whose rewards are computed again.
 """
 
 from __future__ import annotations
@@ -34,27 +33,27 @@ from marl_airhockey.policies.torch_weights import policy_of_weights
 from marl_airhockey.sim.core.errors import require
 
 REPORT = 100
-"""Steps of all worlds from one row of the log to the next"""
+"""Number of steps of all worlds between two rows of the log."""
 BUFFERS = {"relabelled": GoalEndsReplayBuffer, "recorded": HerReplayBuffer}
-"""Buffers by the setting `ends`"""
+"""Classes of replay buffers by the setting `ends`."""
 SAMPLE = 2000
-"""Remembered states in which the exploration is measured"""
+"""Number of remembered states that measure the exploration."""
 
 
 def train_with_hindsight(run: TrainingRun[HindsightConfig]) -> Metrics:
-    """Train a run from where it stands to its end; return the last evaluation.
+    """Train a run to its end, or resume it; return the last evaluation.
 
-    One that goes on has its networks, and fills its memory anew.
+    A resumed run keeps its networks and fills its replay buffer again.
     """
     with training_threads(run.config.torch_threads):
         return HindsightTrainer(run).train()
 
 
 class HindsightTrainer:
-    """Actor and critics of one run.
+    """Actor and critics of a run.
 
     Args:
-        run: whose folder is kept up to date.
+        run: Run whose folder is updated.
     """
 
     def __init__(self, run: TrainingRun[HindsightConfig]) -> None:
@@ -84,19 +83,19 @@ class HindsightTrainer:
     def _advance(self) -> tuple[int, float]:
         """Play and learn for some steps; return the steps so far and the rate."""
         model, config = self.model, self._run.config
-        # At first until the random actions, of which nothing is learned, are over.
+        # The first call also plays all random actions, before learning begins.
         random = max(model.learning_starts - model.num_timesteps, 0)
         steps = min(random + REPORT * config.num_worlds, self._run.steps_left)
         learn_for(model, steps, self._slots)
         return model.num_timesteps, config.learning_rate
 
     def _evaluate(self) -> Metrics:
-        """Evaluate and save the policy; return the evaluation's row."""
+        """Evaluate and save the policy; return the row of the evaluation."""
         make = partial(policy_driver, self.policy(), "training")
         return evaluate_and_record(self._run, make, self.model.logger, self._save)
 
     def policy(self) -> NumpyPolicy:
-        """Return the mean action of the policy as it is."""
+        """Return the mean action of the current policy."""
         model, config = self.model, self._run.config
         assert model.replay_buffer is not None
         card = {
@@ -108,7 +107,7 @@ class HindsightTrainer:
         actor: Any = vars(model)["actor"]
         hidden = [f"latent_pi.{2 * k}" for k in range(len(config.hidden))]
         scale = actor.features_extractor.centre, 1.0 / actor.features_extractor.rate
-        # Its exploration differs from state to state: what it is on the whole.
+        # The exploration depends on the state: its deviation over many states.
         seen = model.replay_buffer.sample(SAMPLE, env=model.get_vec_normalize_env())
         with torch.no_grad():
             off = actor(seen.observations) - actor(seen.observations, True)
@@ -136,14 +135,14 @@ def _algorithm(name: str) -> type[OffPolicyAlgorithm]:
 
 
 def build_model(config: HindsightConfig, env: AirHockeyVecEnv) -> OffPolicyAlgorithm:
-    """Return a fresh model, with the card of its policy as ``model.card``."""
+    """Return a new model, with the card of its policy as ``model.card``."""
     layout = env.world.observer.layout
-    # An episode can be learned from when it has ended.
+    # Only finished episodes can be relabelled.
     first = max(config.learning_starts, config.num_worlds * env.world.max_cycles)
     if config.total_steps <= first:
         raise ValueError(
-            f"total_steps: {config.total_steps} must be above {first}, the steps of "
-            "random actions with which learning begins (learning_starts)"
+            f"total_steps: {config.total_steps} must be above {first}, the number of "
+            "steps with random actions at the beginning (learning_starts)"
         )
     model = _algorithm(config.critics)(
         "MultiInputPolicy",
@@ -174,6 +173,6 @@ def build_model(config: HindsightConfig, env: AirHockeyVecEnv) -> OffPolicyAlgor
 
 
 def _entropy(model: Any) -> torch.Tensor:
-    """Return the logarithm of the weight of the entropy, which is learned."""
+    """Return the logarithm of the entropy weight, which is a learned parameter."""
     found: torch.Tensor = model.log_ent_coef
     return found

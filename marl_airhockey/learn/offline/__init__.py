@@ -1,1 +1,1 @@
-"""Learning from recordings alone, each algorithm in one file."""
+"""Offline reinforcement learning from recordings, with one file for each algorithm."""

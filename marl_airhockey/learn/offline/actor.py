@@ -18,8 +18,8 @@ class Algorithm(GaussianActor, ABC):
 
     Args:
         config: Configuration of the run.
-        centre: Centre (D,) of the observation.
-        unit: Typical size (D,) of its difference from the centre.
+        centre: Centre of the observation, (D,).
+        unit: Typical size of its difference from the centre, (D,).
     """
 
     def __init__(self, config: OfflineConfig, centre: Any, unit: Any) -> None:
@@ -27,7 +27,10 @@ class Algorithm(GaussianActor, ABC):
         self.config = config
 
     def log_density(self, mean: Tensor, action: Tensor) -> Tensor:
-        """Return the log density (n,) of actions; log deviations are in -5 .. 2."""
+        """Return the log density (n,) of actions; log deviations are clipped.
+
+        Log standard deviations are clipped to -5 .. 2.
+        """
         log_std = self.log_std.clamp(-5.0, 2.0)
         gap = (action - mean) * torch.exp(-log_std)
         density: Tensor = (-0.5 * gap * gap - log_std - HALF_LOG_TAU).sum(-1)
@@ -35,12 +38,12 @@ class Algorithm(GaussianActor, ABC):
 
     @abstractmethod
     def losses(self, step: int, batch: StepBatch) -> dict[str, Tensor]:
-        """Return the losses, whose sum is descended on, by name.
+        """Return the losses by name; their sum is minimized.
 
         Args:
-            step: Number of the step, from 0.
+            step: Index of the gradient step, from 0.
             batch: Steps with scaled observations.
         """
 
     def update_targets(self, step: int) -> None:
-        """Update target networks after a step; without them, do nothing."""
+        """Update the target networks after a step. By default there are none."""

@@ -10,11 +10,11 @@ from marl_airhockey.learn.offline.dataset import StepBatch
 
 
 class BehaviourCloning(Algorithm):
-    """Behaviour cloning; ``share`` below 1 clones the best episodes alone."""
+    """Behaviour cloning; with ``share`` below 1 only the best episodes are cloned."""
 
     def losses(self, step: int, batch: StepBatch) -> dict[str, Tensor]:
         error = (self.actor(batch.observation) - batch.action).square()
-        # The deviation is that of the errors; the actor does not care.
+        # The deviation is fitted to the errors and does not affect the actor.
         spread = torch.exp(2 * self.log_std)
         deviation = (error.detach().mean(0) / spread / 2 + self.log_std).sum()
         return {"actor": error.sum(-1).mean(), "deviation": deviation}

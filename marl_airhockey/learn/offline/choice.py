@@ -1,4 +1,4 @@
-"""Choice of episodes that are learned from, and what it comes to."""
+"""Choice of the episodes to learn from, and a summary of them."""
 
 from __future__ import annotations
 
@@ -13,16 +13,21 @@ from marl_airhockey.learn.offline.config import OfflineConfig
 
 
 def best_of(returns: Sequence[float], share: float) -> list[int]:
-    """Return which of some episodes are learned from: a share, of the best returns."""
+    """Return the indices of the episodes with the highest returns.
+
+    Args:
+        returns: Return of each episode.
+        share: Share of the episodes to choose, at least one episode.
+    """
     order = np.argsort([-value for value in returns], kind="stable")
     return [int(k) for k in order[: max(round(share * len(returns)), 1)]]
 
 
 def learned_from(config: OfflineConfig) -> list[str]:
-    """Return what a run learns from, and what is odd about it, a line each.
+    """Return lines that summarize the data of a run and warn about unusual properties.
 
     Raises:
-        ValueError: A recording that makes no sense; named.
+        ValueError: A recording is invalid. The message names it.
     """
     files, seat = [Path(path) for path in config.data], config.seat
     rows = [row for path in files for row in read_episode_rows(path) if row["length"]]
@@ -38,19 +43,19 @@ def learned_from(config: OfflineConfig) -> list[str]:
     if success and not any(success):
         lines.append("none of these episodes succeeded")
     if steps < config.batch_size:
-        lines.append(f"these are fewer steps than a batch has, {config.batch_size}")
+        lines.append(f"the data have fewer steps than a batch has, {config.batch_size}")
     for agent, driver in config.drivers.items():
         others = _drivers(files, int(agent.removeprefix("paddle_")), seat) - {driver}
         if others:
             lines.append(
-                f"{agent} is {driver} in evaluations, and in some recordings "
-                f"{', '.join(sorted(others))}; --driver {agent}=NAME chooses"
+                f"{agent} is {driver} in evaluations, but in some recordings "
+                f"{', '.join(sorted(others))}; --driver {agent}=NAME selects a driver"
             )
     return lines
 
 
 def _of(row: dict[str, Any], name: str, seat: int) -> float | None:
-    """Return a number of a seat in a row of episodes; None if it is not there."""
+    """Return a value of a seat in a row of the episode table; None if it is missing."""
     values = row.get(name) or []
     return float(values[seat]) if seat < len(values) else None
 

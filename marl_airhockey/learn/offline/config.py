@@ -1,4 +1,4 @@
-"""Configurations of learning from recordings."""
+"""Configuration of offline reinforcement learning from recordings."""
 
 from __future__ import annotations
 
@@ -19,61 +19,77 @@ from marl_airhockey.learn.settings import check_names
 from marl_airhockey.sim.core.errors import unknown_name
 
 STEPS = {"bc": 20_000, "iql": 40_000, "td3_bc": 40_000, "rebrac": 40_000}
-"""Gradient steps of each algorithm, unless others are given"""
+"""Default number of gradient steps of each algorithm."""
 PIXEL_STEPS = 8_000
-"""The same of cloning from pixels"""
+"""Default number of gradient steps of cloning from pixels."""
 ALGORITHMS = tuple(STEPS)
-"""Names of the algorithms, which are those of their files"""
+"""Names of the algorithms, which are also the names of their files."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class OfflineConfig(RunConfig):
-    """Settings of a run that learns from recordings; ``total_steps`` of its gradient.
+    """Settings of a run that learns from recordings.
 
     Raises:
-        ValueError: a value that makes no sense, named.
+        ValueError: A setting is invalid. The message names it.
     """
 
     MAY_BE_ZERO: ClassVar[tuple[str, ...]] = (
         *("seed", "seat", "alpha", "critic_penalty", "target_noise"),
     )
+    """Names of the number settings that may be 0."""
 
     algo: str
+    """Name of the algorithm: "bc", "iql", "td3_bc" or "rebrac"."""
     data: list[str]
-    """Files of recordings, and folders of them"""
+    """Paths of the recordings, at least one."""
     seat: int = 0
-    """Seat whose play is learned from"""
+    """Index of the seat whose actions are learned, 0 or more."""
     share: float = 1.0
-    """Share of the episodes that are used, those of the highest returns"""
+    """Share of the episodes that are used, above 0 and at most 1. Episodes with the
+    highest returns are chosen."""
     total_steps: int
+    """Number of gradient steps, above 0."""
     batch_size: int = 256
+    """Number of steps in a minibatch, above 0."""
     learning_rate: float = 3e-4
+    """Initial learning rate, above 0. It falls to 0 along half a cosine."""
     gamma: float = 0.99
+    """Discount per control step, above 0 and at most 1."""
     hidden: list[int]
+    """Widths of the hidden layers, each above 0."""
     evaluations: int = 5
+    """Number of evaluations during training, above 0."""
     eval_episodes: int = 200
+    """Number of episodes of each evaluation, above 0."""
     expectile: float = 0.7
-    """Of IQL: the expectile of the values of actions that a state's value is"""
+    """IQL: expectile of the action values that defines the value of a state, above 0
+    and at most 1."""
     temperature: float = 3.0
-    """Of IQL: how much better actions count more, per unit of advantage"""
+    """IQL: factor of the advantage in the exponent of an action's weight, above 0."""
     tau: float = 0.005
-    """Fraction by which targets move toward their networks in a step"""
+    """Share by which target networks move toward their networks in a step, above 0 and
+    at most 1."""
     alpha: float = 0.2
-    """Of TD3+BC: weight of the value against that of cloning. The authors have 2.5; in
-    tasks that need precise actions, as reach, it leads the actor away from the data"""
+    """TD3+BC: weight of the value against cloning, 0 or more. The value of the authors
+    is 2.5. In tasks that need precise actions, such as reach, it moves the actor away
+    from the data."""
     actor_penalty: float = 2.0
-    """Of ReBRAC: weight of the squared distance of actions from those of the data"""
+    """ReBRAC: weight of the squared distance between actions and the data in the loss
+    of the actor, above 0."""
     critic_penalty: float = 0.01
-    """Of ReBRAC: the same in the target of the critics"""
+    """ReBRAC: weight of this squared distance in the target of the critics, 0 or
+    more."""
     policy_delay: int = 2
-    """Of TD3+BC and ReBRAC: steps of the critics for each of the actor"""
+    """TD3+BC and ReBRAC: number of critic steps per actor step, above 0."""
     target_noise: float = 0.2
-    """Of TD3+BC and ReBRAC: standard deviation of the noise of target actions"""
+    """TD3+BC and ReBRAC: standard deviation of the noise of target actions, 0 or
+    more."""
     noise_clip: float = 0.5
-    """Of TD3+BC and ReBRAC: largest magnitude of that noise"""
+    """TD3+BC and ReBRAC: largest magnitude of this noise, above 0."""
 
     def rate(self, step: int) -> float:
-        """Return the learning rate of a step: half a cosine, to nothing at the end."""
+        """Return the learning rate of a step, which falls to 0 along half a cosine."""
         share = 0.5 * (1.0 + math.cos(math.pi * step / self.total_steps))
         return self.learning_rate * share
 
@@ -82,7 +98,7 @@ class OfflineConfig(RunConfig):
         if self.algo not in ALGORITHMS:
             raise ValueError(unknown_name("algo", self.algo, ALGORITHMS))
         if not self.data:
-            raise ValueError(f"data: {self.algo} learns from recordings; name some")
+            raise ValueError(f"data: {self.algo} needs at least one recording")
         for name in ("share", "expectile", "tau"):
             if not 0 < getattr(self, name) <= 1:
                 raise ValueError(f"{name}: {getattr(self, name)} must be in 0 .. 1")
@@ -93,16 +109,19 @@ def offline_config(
 ) -> OfflineConfig:
     """Return the configuration of a run on some recordings.
 
-    Scenario, options, observation and the drivers of other seats are those of the
-    recordings; evaluations are in their profile unless ``changes`` has another.
+    Scenario, options, observation type, profile and the drivers of other seats are
+    those of the recordings. ``changes`` may contain another profile for the
+    evaluations.
 
     Args:
-        algo: name of the algorithm.
-        data: Files, folders and names of datasets, which are built if they are not.
-        changes: settings by name.
+        algo: Name of the algorithm.
+        data: Files, folders and names of datasets. A dataset that does not exist is
+            built.
+        changes: Changed settings, by name.
 
     Raises:
-        ValueError: no recordings, some that do not fit together, or a bad setting.
+        ValueError: There are no recordings, they do not fit together, or a setting is
+            invalid.
     """
     if algo not in ALGORITHMS:
         raise ValueError(unknown_name("algo", algo, ALGORITHMS))
@@ -114,16 +133,16 @@ def offline_config(
     if pixels:
         _check_pixels(algo, head)
     for name in ("scenario", "options", "observe", "control_dt"):
-        shown = pixels and name == "observe"  # Rendered from the recorded states.
+        shown = pixels and name == "observe"  # Pixels are rendered from the states.
         if name in changes and changes[name] != head[name] and not shown:
             raise ValueError(
                 f"{name}: {changes[name]!r}, but the recordings are of {head[name]!r} "
-                f"({shown_name(files[0])}); name others, or leave it out"
+                f"({shown_name(files[0])}); give other recordings or omit it"
             )
     seat, players = changes.get("seat", 0), head["players"]
     if seat not in range(len(players)):
-        raise ValueError(f"seat: there is no seat {seat!r} in {files[0]}")
-    # Evaluated policies play paddle_0, so who played there takes the learned seat.
+        raise ValueError(f"seat: {seat!r} does not exist in {files[0]}")
+    # Evaluated policies have paddle_0, so the driver of paddle_0 takes their seat.
     drivers = {
         f"paddle_{i}": players[0 if i == seat else i]["driver"]
         for i in range(1, len(players))
@@ -146,11 +165,15 @@ def offline_config(
 
 
 def _check_pixels(algo: str, head: Mapping[str, Any]) -> None:
-    """Refuse to learn from pixels what cannot be rendered or is not cloned."""
+    """Check that pixels can be rendered and that they are cloned.
+
+    Raises:
+        ValueError: The algorithm is not bc, or the recordings cannot be rendered.
+    """
     if algo != "bc":
-        raise ValueError(f'observe: from "pixels" learns bc alone, not {algo}')
+        raise ValueError(f'observe: "pixels" are learned by bc alone, not {algo}')
     if head["profile"] != "ideal" or "goals" in head:
         raise ValueError(
-            'observe: "pixels" are rendered from states, as the profile '
-            "ideal with flat goals shows them; the recordings are of others"
+            'observe: "pixels" are rendered from states and need recordings of the '
+            'profile ideal with goals="flat"'
         )

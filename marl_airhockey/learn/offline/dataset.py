@@ -19,26 +19,28 @@ from marl_airhockey.types import Array
 GOALS = tuple(
     f"observation.{part}" for part in ("observation", "achieved_goal", "desired_goal")
 )
-"""Columns of observations with goals apart, in the order in which they are joined"""
+"""Columns of observations with goals="dict", in the order in which they are joined."""
 NEEDED = ("observation", *GOALS, "action", "reward", "terminated")
-"""Columns that are read"""
+"""Columns that are read."""
 
 
 class StepBatch(NamedTuple):
     """Batch of n steps of one seat."""
 
     observation: Tensor
-    """(n, D)"""
+    """Observations before the steps, (n, D)."""
     action: Tensor
-    """(n, 2), in -1 .. 1"""
+    """Actions, -1 to 1, (n, 2)."""
     reward: Tensor
-    """(n,), divided by the dataset's `reward_scale`"""
+    """Rewards, divided by the `reward_scale` of the dataset, (n,)."""
     next_observation: Tensor
-    """(n, D)"""
+    """Observations after the steps, (n, D)."""
     next_action: Tensor
-    """(n, 2) action of the next step; of the last step of an episode, its own"""
+    """Actions of the next steps, (n, 2). The last step of an episode has its own
+    action."""
     not_done: Tensor
-    """(n,) 0 where the step was terminated, else 1, at a time limit, too"""
+    """0 where the episode was terminated by the step, else 1, (n,). It is 1 at a time
+    limit."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,9 @@ class Dataset:
     """Dataset of N steps of one seat."""
 
     steps: StepBatch
-    """All N steps"""
+    """All N steps."""
     reward_scale: float
-    """Standard deviation of the discounted returns from all steps on"""
+    """Standard deviation of the discounted returns that follow the steps."""
 
     def __len__(self) -> int:
         return len(self.steps.action)
@@ -65,20 +67,21 @@ def load_dataset(
     """Read recordings.
 
     Args:
-        files: of them.
-        seat: whose steps are taken.
-        share: of the episodes that are taken, those of the highest returns.
-        gamma: discount of the returns by which rewards are scaled.
-        size: D, of the scenario's observation.
+        files: Paths of the recordings.
+        seat: Index of the seat whose steps are read.
+        share: Share of the episodes that are read, those with the highest returns.
+        gamma: Discount of the returns that define the scale of the rewards.
+        size: Number of elements of the observations of the scenario, D.
 
     Raises:
-        ValueError: no steps, no observations, or ones of another size, named.
+        ValueError: A recording has no steps, no observations, or observations of
+            another size. The message names it.
     """
     episodes = [
         _seat_of(path, episode, seat, size) for path, episode in _episodes(files)
     ]
     if not episodes:
-        raise ValueError(f"{files[0]}: there are no steps in it")
+        raise ValueError(f"{files[0]}: the recording has no steps")
     returns = [float(parts["reward"].sum()) for parts in episodes]
     kept = [episodes[k] for k in best_of(returns, share)]
     scale = float(np.concatenate([_to_go(p["reward"], gamma) for p in kept]).std())
@@ -111,13 +114,13 @@ def _seat_of(path: Path, episode: Episode, seat: int, size: int) -> dict[str, Ar
     columns, where = episode.columns, f"{path}: episode {episode.index}"
     names = ("observation",) if "observation" in columns else GOALS
     if not all(name in columns for name in names):
-        raise ValueError(f"{where}: there are no observations in it")
+        raise ValueError(f"{where}: there are no observations in the recording")
     parts = [np.concatenate([episode.first[n][None], columns[n]]) for n in names]
     shown = np.concatenate(parts, -1)
     if shown.shape[2] != size:
         raise ValueError(
-            f"{where}: observations have {shown.shape[2]} elements, the scenario's "
-            f"{size}: it was recorded by another version"
+            f"{where}: observations have {shown.shape[2]} elements, but those of the "
+            f"scenario have {size}; record it again with this version"
         )
     if seat >= shown.shape[1]:
         raise ValueError(f"{where}: there is no seat {seat}")
@@ -133,7 +136,7 @@ def _seat_of(path: Path, episode: Episode, seat: int, size: int) -> dict[str, Ar
 
 
 def _to_go(reward: Array, gamma: float) -> Array:
-    """Return the discounted returns (T,) from each step of an episode on."""
+    """Return the discounted returns (T,) that follow each step of an episode."""
     returns = np.zeros(len(reward))
     ahead = 0.0
     for t in range(len(reward) - 1, -1, -1):

@@ -1,7 +1,7 @@
 """Implicit Q-learning (Kostrikov, Nair and Levine, 2022).
 
-The value of a state is an expectile of the values of the actions in the data, so that
-no action outside it is ever asked for; better actions are cloned with more weight.
+The value of a state is an expectile of the values of the actions in the data. No other
+action is therefore ever evaluated. Better actions are cloned with a larger weight.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.offline.dataset import StepBatch
 
 LARGEST_WEIGHT = 100.0
-"""Largest weight of an action, as in the paper"""
+"""Largest weight of an action, as in the paper."""
 
 
 class ImplicitQLearning(Algorithm):
-    """Implicit Q-learning with two critics, whose targets follow."""
+    """Implicit Q-learning with two critics and their target networks."""
 
     def __init__(self, config: OfflineConfig, centre: Any, unit: Any) -> None:
         super().__init__(config, centre, unit)

@@ -1,4 +1,4 @@
-"""Learner: the loop around an offline algorithm, with its logs and files."""
+"""Learner: the training loop of an offline algorithm, with its logs and files."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
 
 REPORT = 500
-"""Steps from one report of progress to the next"""
+"""Number of gradient steps between two reports of progress."""
 
 
 def scale_of(world: World) -> tuple[Array, Array]:
-    """Return centre and unit (D,) of observations; goals apart have 0 and 1."""
+    """Return centre and unit (D,) of observations; goals of a dict have 0 and 1."""
     layout, scenario = world.observer.layout, world.scenario
     if not (isinstance(scenario, GoalScenario) and scenario.goals == "dict"):
         return layout.centre, layout.unit
@@ -43,13 +43,13 @@ def scale_of(world: World) -> tuple[Array, Array]:
 
 
 class Learner:
-    """Learner of one run.
+    """Learner of a run.
 
     Args:
-        run: whose folder is kept up to date.
+        run: Run whose folder is updated.
 
     Raises:
-        ValueError: recordings that cannot be learned from.
+        ValueError: The recordings cannot be used for learning.
     """
 
     def __init__(self, run: TrainingRun[OfflineConfig]) -> None:
@@ -63,7 +63,7 @@ class Learner:
         files = [Path(path) for path in config.data]
         shape = config.seat, config.share, config.gamma, len(centre)
         self._data = load_dataset(files, *shape)
-        # A resumed run draws other steps than those of its beginning.
+        # A resumed run samples other steps than those of its beginning.
         torch.manual_seed(config.seed * 10_000 + run.progress.steps % 9973)
         make: Callable[[OfflineConfig, object, object], Algorithm] = import_module(
             f"marl_airhockey.learn.offline.{config.algo}"
@@ -87,14 +87,14 @@ class Learner:
         last = min(first + REPORT, self._config.total_steps)
         losses: dict[str, float] = {}
         for step in range(first, last):
-            # An actor may learn at every second step alone.
+            # Some algorithms update the actor only at every second step.
             losses |= self.descend(step)
         for name, value in losses.items():
             self._log.record(f"train/{name}", value)
         return last, self._config.learning_rate
 
     def descend(self, step: int) -> dict[str, float]:
-        """Descend once on a batch of steps; return the losses."""
+        """Make one gradient step on a minibatch; return the losses."""
         model = self.model
         batch = self._data.sample(self._config.batch_size)
         for group in self._optimizer.param_groups:
@@ -111,23 +111,23 @@ class Learner:
         return {name: float(loss.detach()) for name, loss in losses.items()}
 
     def policy(self) -> NumpyPolicy:
-        """Return the policy as it is."""
+        """Return the current policy."""
         card = {**self._card, "algo": self._config.algo}
         card["steps"] = self._run.progress.steps
         return self.model.to_numpy(card)
 
     def _evaluate(self) -> Metrics:
-        """Evaluate and save the policy; return the evaluation's row."""
+        """Evaluate and save the policy; return the row of the evaluation."""
         make = partial(policy_driver, self.policy(), "training")
         return evaluate_and_record(self._run, make, self._log, self._save)
 
     def _save(self, name: str) -> None:
-        """Write the policy, and all that it goes on from, under a name."""
+        """Save the policy and everything that a resumed run needs, under a name."""
         parts = self.model, self._optimizer, self.policy()
         save_weights(self._run.folder, name, *parts)
 
 
 def train_offline(run: TrainingRun[OfflineConfig]) -> Metrics:
-    """Train a run from where it stands to its end; return the last evaluation."""
+    """Train a run to its end, or resume it; return the last evaluation."""
     with training_threads(run.config.torch_threads):
         return Learner(run).train()

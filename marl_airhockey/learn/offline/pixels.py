@@ -1,7 +1,7 @@
-"""Behaviour cloning from pixels: the same pictures as ``observe="pixels"`` shows.
+"""Behaviour cloning from pixels, with the same images as ``observe="pixels"``.
 
-Recordings hold states, from which the pictures are rendered. The network is that of
-Mnih et al. (2015) with half of the channels. Its policy is an ONNX model.
+Recordings contain states, from which the images are rendered. The network is that of
+Mnih et al. (2015) with half of the channels. The policy is saved as an ONNX model.
 """
 
 from __future__ import annotations
@@ -37,23 +37,24 @@ from marl_airhockey.sim.world.observer import PIXELS
 from marl_airhockey.types import Array
 
 REPORT = 100
-"""Steps from one report of progress to the next"""
+"""Number of gradient steps between two reports of progress."""
 COLUMNS = ("state.position", "memory.goal", "action")
-"""Columns that are read"""
+"""Columns that are read."""
 
 
 class PixelSteps(NamedTuple):
-    """Steps of one seat, with the pictures that it observed."""
+    """Steps of one seat with the images that it observed."""
 
     frames: Tensor
-    """(M, PIXELS, PIXELS) uint8"""
+    """Rendered frames, (M, PIXELS, PIXELS) uint8."""
     shown: Tensor
-    """(N, FRAMES) numbers of the frames that are observed at a step, newest last"""
+    """Indices of the frames that are observed at a step, the newest last, (N,
+    FRAMES)."""
     action: Tensor
-    """(N, 2), in -1 .. 1"""
+    """Actions, -1 to 1, (N, 2)."""
 
     def sample(self, count: int) -> tuple[Tensor, Tensor]:
-        """Return (n, PIXELS, PIXELS, FRAMES) pictures and (n, 2) actions."""
+        """Return images (n, PIXELS, PIXELS, FRAMES) and actions (n, 2)."""
         rows = torch.randint(len(self.action), (count,))
         pictures = self.frames[self.shown[rows]].permute(0, 2, 3, 1)
         return pictures, self.action[rows]
@@ -62,16 +63,16 @@ class PixelSteps(NamedTuple):
 def render_pictures(
     files: Sequence[Path], scene: Scene, seat: int, share: float
 ) -> PixelSteps:
-    """Render what a seat observed in recordings.
+    """Render the images that a seat observed in recordings.
 
     Args:
-        files: Recordings.
+        files: Paths of the recordings.
         scene: Scene of the scenario.
-        seat: Seat.
-        share: Share of the episodes that are taken, those of the highest returns.
+        seat: Index of the seat.
+        share: Share of the episodes that are used, those with the highest returns.
 
     Raises:
-        ValueError: There are no steps.
+        ValueError: The recordings have no steps.
     """
     rotation = scene.table.rotation(scene.seats[seat].side)
     frames: list[Array] = []
@@ -83,7 +84,7 @@ def render_pictures(
         if len(episode)
     ]
     if not played:
-        raise ValueError(f"{files[0]}: there are no steps in it")
+        raise ValueError(f"{files[0]}: the recording has no steps")
     best = best_of([value for *_, value in played], share)
     taken = {played[k][:2] for k in best}
     for path in files:
@@ -112,7 +113,7 @@ def render_pictures(
 
 
 class PixelActor(nn.Module):
-    """Actor on pictures (n, PIXELS, PIXELS, FRAMES), 0 .. 255; actions (n, 2)."""
+    """Actor on images (n, PIXELS, PIXELS, FRAMES), 0 to 255; actions are (n, 2)."""
 
     def __init__(self, hidden: Sequence[int]) -> None:
         super().__init__()
@@ -145,7 +146,7 @@ class PixelActor(nn.Module):
         return Policy(predict, shape, "pixels", "training", can_sample=False)
 
     def save_onnx(self, card: dict[str, Any], path: Path) -> None:
-        """Write the actor as an ONNX model, with a card."""
+        """Write the actor as an ONNX model with a card."""
         graph = Graph()
         x = graph.node("Transpose", "observation", perm=[0, 3, 1, 2])
         x = graph.node("Div", x, graph.constant("white", 255.0))
@@ -166,7 +167,7 @@ class PixelCloning:
     """Behaviour cloning from pixels in a run.
 
     Args:
-        run: whose folder is kept up to date.
+        run: Run whose folder is updated.
     """
 
     def __init__(self, run: TrainingRun[OfflineConfig]) -> None:
@@ -204,7 +205,7 @@ class PixelCloning:
         return evaluate_and_record(self._run, make, self._log, self._save)
 
     def _descend(self, step: int) -> float:
-        """Descend once on a batch of steps; return the loss."""
+        """Make one gradient step on a minibatch; return the loss."""
         pictures, action = self._data.sample(self._config.batch_size)
         for group in self._optimizer.param_groups:
             group["lr"] = self._config.rate(step)
@@ -215,7 +216,7 @@ class PixelCloning:
         return float(loss.detach())
 
     def _save(self, name: str) -> None:
-        """Write the policy, and all that a resumed run needs, under a name."""
+        """Save the policy and everything that a resumed run needs, under a name."""
         folder, config = self._run.folder, self._config
         save_state(folder, name, self.model, self._optimizer)
         card = {**config.card([]), "algo": config.algo}
@@ -224,6 +225,6 @@ class PixelCloning:
 
 
 def clone_from_pixels(run: TrainingRun[OfflineConfig]) -> Metrics:
-    """Train a run to its end; return the last evaluation."""
+    """Train a run to its end, or resume it; return the last evaluation."""
     with training_threads(run.config.torch_threads):
         return PixelCloning(run).train()

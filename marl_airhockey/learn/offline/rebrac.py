@@ -1,8 +1,9 @@
-"""ReBRAC (Tarasov et al., 2023): TD3+BC with a penalty in the critics' target, too.
+"""ReBRAC (Tarasov et al., 2023): TD3+BC with an additional penalty in the critics.
 
-Actor and critics have weights of their own for the distance from the actions of the
-data, and the critics layer normalization. Its larger batches and third layer are not
-taken over, so that all algorithms here have the same networks.
+The loss of the actor and the target of the critics have separate weights for the
+distance from the actions of the data. The critics have layer normalization. The larger
+batches and the third layer of the paper are not used, so that all algorithms have the
+same networks.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from marl_airhockey.learn.offline.td3_bc import TD3BC
 
 
 class ReBRAC(TD3BC):
-    """ReBRAC; settings are `actor_penalty` and `critic_penalty`."""
+    """ReBRAC with the settings `actor_penalty` and `critic_penalty`."""
 
     NORMALIZED = True
 
@@ -25,7 +26,7 @@ class ReBRAC(TD3BC):
     def actor_loss(self, batch: StepBatch) -> Tensor:
         value, error = self.value_and_error(batch)
         scale = 1.0 / value.abs().mean().detach()
-        # The mean over both numbers of an action, as a sum.
+        # The error is a mean over the two elements of an action; 2 makes it a sum.
         return 2.0 * self.config.actor_penalty * error - scale * value.mean()
 
 

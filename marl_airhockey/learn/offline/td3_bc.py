@@ -1,7 +1,7 @@
-"""TD3+BC (Fujimoto and Gu, 2021): a deterministic actor that stays near the data.
+"""TD3+BC (Fujimoto and Gu, 2021): a deterministic actor that stays close to the data.
 
-The actor climbs the value of its actions, divided by the mean magnitude of that value,
-and is held to the actions of the data by their squared distance.
+The actor maximizes the value of its actions, divided by the mean magnitude of this
+value. The squared distance from the actions of the data is a penalty.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from marl_airhockey.policies.numpy_policy import NumpyPolicy
 
 
 class TD3BC(Algorithm):
-    """TD3+BC with two critics; the actor learns at every second step of theirs."""
+    """TD3+BC with two critics and one actor step per `policy_delay` critic steps."""
 
     NORMALIZED = False
-    """Whether the critics have layer normalization"""
+    """True if the critics have layer normalization."""
 
     def __init__(self, config: OfflineConfig, centre: Any, unit: Any) -> None:
         super().__init__(config, centre, unit)
-        # No loss has it: it is the noise of sampled actions alone.
+        # It is not learned; it is only the noise of sampled actions.
         self.log_std.requires_grad_(False).fill_(-2.3)
         sizes = [len(centre) + 2, *config.hidden, 1]
         self.critics = TwinLayers(sizes, self.NORMALIZED)
@@ -45,7 +45,7 @@ class TD3BC(Algorithm):
 
     @torch.no_grad()
     def critic_target(self, batch: StepBatch) -> Tensor:
-        """Return the values (n,) that the critics learn."""
+        """Return the target values (n,) of the critics."""
         after, config = batch.next_observation, self.config
         action = torch.tanh(self.actor_target(after))
         noise = config.target_noise * torch.randn_like(action)
@@ -57,7 +57,7 @@ class TD3BC(Algorithm):
         return found
 
     def target_penalty(self, action: Tensor, batch: StepBatch) -> Tensor | float:
-        """Return what is subtracted (n,) from the value of a target action."""
+        """Return the penalty of the values of target actions, (n,)."""
         return 0.0
 
     def actor_loss(self, batch: StepBatch) -> Tensor:
@@ -67,9 +67,9 @@ class TD3BC(Algorithm):
         return error - scale * value.mean()
 
     def value_and_error(self, batch: StepBatch) -> tuple[Tensor, Tensor]:
-        """Return the values (n,) of the actor's actions and their mean square error."""
+        """Return values (n,) of the actor's actions, and their mean squared error."""
         action = torch.tanh(self.actor(batch.observation))
-        # Constants here, so that only the actor learns from this.
+        # The critics are constant here, so that only the actor learns.
         fixed = {name: p.detach() for name, p in self.critics.named_parameters()}
         both = torch.cat([batch.observation, action], -1)
         value: Tensor = functional_call(self.critics, fixed, (both,))[0]

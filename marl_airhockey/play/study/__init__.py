@@ -1,1 +1,1 @@
-"""Studies: people play against opponents in the order of a plan."""
+"""Studies in which people play against opponents in a planned order."""

@@ -1,4 +1,4 @@
-"""People of a study: who may take part, who is present, who is erased."""
+"""People of a study: admission, presence and erasure."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from marl_airhockey.play.study.people import Participant, Person
 from marl_airhockey.play.study.plan import Plan
 
 ABSENT = 600.0
-"""Time after which a participant whose page is gone counts as having left, s."""
+"""Time after which a participant without a page has left the study, s."""
 PARTICIPANT_SEAT, PARTNER_SEAT = 0, 1
 
 
@@ -37,11 +37,11 @@ class Admission:
         """Recorder of the participant's games; None without a participant."""
         self.participant: Participant | None = None
         self.partner: Person | None = None
-        """Person who plays as the participant's opponent."""
+        """Person in the role of the participant's opponent."""
         self._erased: set[str] = set()
         """Keys of pages whose person has been erased."""
         self._seated_for: tuple[Course, int] | None = None
-        """Course and block whose opponent is seated; None for nobody's."""
+        """Course and block of the seated opponent; None without a participant."""
 
     def hello(self, client: Client, key: str) -> None:
         """Seat a page; resume the interrupted session of its person."""
@@ -53,14 +53,14 @@ class Admission:
             self._match.start()
 
     def person(self, client: Client) -> Person | None:
-        """Return the person at a page; None for somebody who has not agreed."""
+        """Return the person of a page; None before the consent."""
         for person in (self.participant, self.partner):
             if person is not None and person.key == client.key:
                 return person
         return None
 
     def seat_people(self) -> None:
-        """Give everybody the seat of their role; of two pages of a person the first."""
+        """Assign seats by role; only the first page of a person gets a seat."""
         seats: dict[int, Client] = {}
         for client in sorted(self._seats.clients, key=lambda c: c.seat is None):
             person = self.person(client)
@@ -75,20 +75,20 @@ class Admission:
                 self._seats.take(client, seat)
 
     def consent(self, client: Client, version: str) -> None:
-        """Admit the person at a page, who has agreed to the texts of a version.
+        """Admit the person of a page after the consent to a version of the texts.
 
         Raises:
-            ValueError: The texts have changed since.
+            ValueError: The texts have changed, or the consent cannot be stored.
         """
         if version != self.plan.version:
-            raise ValueError("these texts have changed: load the page again")
+            raise ValueError("the texts have changed; load the page again")
         if self.stage(client) != "consent" or not client.key:
             return
         role = "participant" if self.participant is None else "partner"
         try:
             diary = Diary.begin(self.folder, role, self.plan, client.key)
         except OSError as error:
-            raise ValueError(f"nothing can be saved: {error.strerror}") from error
+            raise ValueError(f"data cannot be stored: {error.strerror}") from error
         now = time.monotonic()
         self._erased.discard(client.key)
         if self.participant is None:
@@ -98,14 +98,14 @@ class Admission:
         self.seat_people()
 
     def _admit(self, key: str, diary: Diary) -> None:
-        """Begin with a participant, or resume where the diary ends."""
+        """Start with a participant, or resume at the end of the event log."""
         course = Course(self.plan, diary)
         self.participant = Participant(key, diary, time.monotonic(), course)
         self.recorder = Recorder(diary.folder)
         self.prepare()
 
     def prepare(self) -> None:
-        """Seat the opponent of the participant's block."""
+        """Set the opponent of the participant's block."""
         course = self.participant.course if self.participant else None
         wanted = (course, course.block) if course else None
         if wanted == self._seated_for:
@@ -116,7 +116,7 @@ class Admission:
         self.seat_people()
 
     def _resume(self, key: str) -> None:
-        """Resume a session that was cut off, from its diary."""
+        """Resume an interrupted session from its event log."""
         if not self.folder.is_dir():
             return
         for diary in diaries(self.folder):
@@ -129,14 +129,14 @@ class Admission:
                 return
 
     def dismiss_erased(self) -> None:
-        """Dismiss people whose folder somebody has deleted."""
+        """Dismiss people whose folder was deleted."""
         for person in (self.participant, self.partner):
             if person is not None and not person.diary.exists:
                 self._dismiss(person)
                 self._erased.add(person.key)
 
     def withdraw(self, client: Client) -> None:
-        """Erase all data of the person at a page, immediately."""
+        """Erase all data of the person of a page immediately."""
         person = self.person(client)
         if person is None:
             return
@@ -145,14 +145,14 @@ class Admission:
         self._erased.add(client.key)
 
     def next_person(self, client: Client) -> None:
-        """Dismiss a participant who has come to the end."""
+        """Dismiss a participant who has completed the plan."""
         person = self.person(client)
         if isinstance(person, Participant) and person.at_end:
             self._dismiss(person)
         self._erased.discard(client.key)
 
     def _dismiss(self, person: Person) -> None:
-        """End a person's part; a game that runs is broken off."""
+        """End the participation of a person and abort a running game."""
         is_participant = person is self.participant
         if is_participant or self._match.drivers.names[PARTNER_SEAT] == PERSON:
             self._match.abort("a player has left")
@@ -160,13 +160,13 @@ class Admission:
                 self.recorder.end(self._match, "a player has left")
         if is_participant:
             self.participant = self.recorder = None
-            self._match.clear()  # The next participant sees no score of this one.
+            self._match.clear()  # The next participant must not see this score.
         else:
             self.partner = None
         self.seat_people()
 
     def check_presence(self, now: float) -> None:
-        """Pause for people who are idle; dismiss those who stay away."""
+        """Pause for people who are idle; dismiss people who are absent too long."""
         for client in self._seats.clients:
             person = self.person(client)
             if person is not None:
@@ -185,7 +185,7 @@ class Admission:
                 self._dismiss(person)
 
     def stage(self, client: Client) -> str:
-        """Return the stage of a course, or: consent, partner, busy, erased."""
+        """Return the stage of a page's course, or consent, partner, busy or erased."""
         if client.key in self._erased:
             return "erased"
         person = self.person(client)

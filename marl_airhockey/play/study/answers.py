@@ -1,4 +1,4 @@
-"""Games and answers of a study as rows, from its diaries."""
+"""Games and answers of a study as rows, from its event logs."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ GAMES = (
     *(*_WHO, "game", "practice", "result", "rule", "score", "seconds", "pauses"),
     *("input", "width", "height", "density", "hz", "recording", "at"),
 )
-"""Columns of a game; the last ones are the page's devices, see `protocol.MESSAGES`."""
+"""Columns of a game, with the devices of the page, see `protocol.MESSAGES`."""
 ANSWERS = (*_WHO, "question", "value", "choice", "text", "at")
 """Columns of an answer."""
 MEASURES = (*_WHO, "game", "measure", "value")
 """Columns of the long table."""
 CUT_OFF = "cut off"
-"""Result of a game that the server did not survive."""
+"""Result of a game that was interrupted by a crash of the server."""
 POINTS = {"won": 1.0, "drawn": 0.5, "lost": 0.0}
 """Points of the participant by the result of a game."""
 
 
 @dataclass(frozen=True)
 class Answers:
-    """Games and answers as rows, and counts of participants."""
+    """Games and answers as rows, and numbers of participants."""
 
     games: list[dict[str, Any]]
-    """Rows of `GAMES`; results: won, lost, drawn, `BROKEN_OFF`, `CUT_OFF`."""
+    """Rows of `GAMES`; a result is won, lost, drawn, `BROKEN_OFF` or `CUT_OFF`."""
     answers: list[dict[str, Any]]
     """Rows of `ANSWERS`."""
     scores: list[dict[str, float]]
-    """What each game has counted, by name, for the participant and for others."""
+    """Scores of each game, by name, of the participant and of others."""
     participants: int
     complete: int
-    """Number of participants who came to the end."""
+    """Number of participants who completed the plan."""
 
     def counted(self) -> list[dict[str, Any]]:
-        """Return the games that count: played to the end, and no practice."""
+        """Return the games that count: completed games without practice."""
         return [g for g in self.games if not g["practice"] and g["result"] in POINTS]
 
     def measures(self) -> list[dict[str, Any]]:
-        """Return rows of `MEASURES`: a number each, of a game or of an answer."""
+        """Return rows of `MEASURES`, one for each number of a game or an answer."""
         rows = []
         for game, scores in zip(self.games, self.scores, strict=True):
             if game["practice"] or game["result"] not in POINTS:
@@ -63,7 +63,7 @@ class Answers:
 
 
 def read_answers(folder: Path) -> Answers:
-    """Read the diaries of a study's participants."""
+    """Read the event logs of the participants of a study."""
     found = Answers([], [], [], 0, 0)
     participants = complete = 0
     for diary in diaries(folder):
@@ -85,7 +85,7 @@ def read_answers(folder: Path) -> Answers:
 
 
 def _games_of(diary: Diary) -> Iterator[dict[str, Any]]:
-    """Yield the games of a diary, those included that a crash has cut off."""
+    """Yield the games of an event log, including those interrupted by a crash."""
     begun: dict[str, Any] | None = None
     for row in diary.rows:
         if row["kind"] in ("begin", "game") and begun is not None:
@@ -103,7 +103,7 @@ def _games_of(diary: Diary) -> Iterator[dict[str, Any]]:
 
 
 def _by_side(scores: dict[str, list[float]]) -> dict[str, float]:
-    """Return counts by name: the participant's, and those of all others."""
+    """Return scores by name, of the participant and of all others."""
     found = {}
     for name, counts in scores.items():
         found[name] = counts[0]

@@ -1,8 +1,9 @@
-"""Archive of a study: a folder for each person, and how it is erased.
+"""Archive of a study, with a folder for each person that can be erased.
 
-A folder ``participant-007`` holds ``diary.jsonl`` (a head, then consent, games and
-answers, a line each) and the recordings of that participant's games. A person who plays
-as an opponent has a folder ``partner-000`` with the consent alone.
+A folder ``participant-007`` contains the event log ``diary.jsonl`` and the recordings
+of the participant's games. The log has one line for the metadata, the consent, each
+game and each answer. A person in the role of an opponent has a folder ``partner-000``
+with the consent only.
 """
 
 from __future__ import annotations
@@ -23,24 +24,24 @@ from marl_airhockey.play.study.plan import Plan
 from marl_airhockey.sim.core.recording import META
 
 FORMAT = 1
-"""Version of the format of diaries."""
+"""Version of the format of event logs."""
 DIARY = "diary.jsonl"
 TABLES = ("games.csv", "answers.csv", "measures.csv", "answers.md", "answers.png")
-"""Files that `airhockey data report` writes of a study."""
+"""Files that `airhockey data report` writes for a study."""
 REPORTS = (*TABLES, "report.json", "report.md", "report.png")
 """All files that `airhockey data report` writes."""
 LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
-"""Characters of codes; none that is mistaken for another."""
+"""Characters of codes, without characters that look alike."""
 
 
 class Diary:
-    """Notes on one person; every line is on the disk when `write` returns.
+    """Event log of one person; every line is on the disk when `write` returns.
 
-    What a full disk does not take is kept, and written as soon as it does.
+    Lines that cannot be written because the disk is full are written later.
 
     Args:
-        folder: of the person.
-        rows: its lines so far, the head first.
+        folder: Folder of the person.
+        rows: Existing lines, starting with the metadata.
     """
 
     def __init__(self, folder: Path, rows: list[dict[str, Any]]) -> None:
@@ -51,14 +52,16 @@ class Diary:
 
     @classmethod
     def begin(cls, study: Path, role: str, plan: Plan, page: str) -> Diary:
-        """Begin a diary with the consent that has just been given.
+        """Start an event log with the consent of a person.
+
+        A participant gets the lowest free number, which determines the order. An erased
+        person therefore leaves no gap in the counterbalancing.
 
         Args:
-            study: its folder.
+            study: Folder of the study.
             role: "participant" or "partner".
-            plan: of the study; a participant's order is that of the lowest free number,
-                so that an erased person leaves no gap in the counterbalancing.
-            page: key of the person's page, of which a digest is kept.
+            plan: Plan of the study.
+            page: Key of the person's page, of which a digest is stored.
         """
         number, folder = _new_folder(study, role)
         diary = cls(folder, [])
@@ -76,7 +79,7 @@ class Diary:
 
     @property
     def code(self) -> str:
-        """Random code by which the person is known."""
+        """Random code that identifies the person."""
         return str(self.rows[0]["code"])
 
     @property
@@ -86,16 +89,16 @@ class Diary:
 
     @property
     def ended(self) -> bool:
-        """True if the person has come to the end, or has left."""
+        """True if the person has completed the plan or left."""
         return any(row["kind"] == "end" for row in self.rows)
 
     @property
     def exists(self) -> bool:
-        """True if it is still on the disk: somebody may have erased it."""
+        """True if the event log is on the disk; False after it was erased."""
         return (self.folder / DIARY).exists()
 
     def write(self, kind: str, **row: Any) -> None:
-        """Add a line, with the time as ``at``."""
+        """Add a line with the current time as ``at``."""
         now = datetime.datetime.now(datetime.UTC).isoformat()
         self.rows.append({"kind": kind, "at": now, **row})
         self._unwritten.append(json.dumps(self.rows[-1], separators=(",", ":")) + "\n")
@@ -115,21 +118,21 @@ class Diary:
         except OSError as error:
             self.failure = error.strerror or str(error)
             with contextlib.suppress(OSError):
-                os.truncate(path, size)  # Half a line would spoil those after it.
+                os.truncate(path, size)  # A partial line would damage later lines.
             return
         self._unwritten, self.failure = [], ""
 
 
 def page_digest(page: str) -> str:
-    """Return the digest of a page's key, by which the page is recognised."""
+    """Return the digest of a page's key, which identifies the page."""
     return hashlib.sha256(page.encode()).hexdigest()[:16]
 
 
 def claim_folder(folder: Path, plan: Path) -> None:
-    """Reserve a folder for a plan, of which a copy is kept there.
+    """Reserve a folder for a plan and copy the plan to it.
 
     Raises:
-        ValueError: a folder of another plan, or one that cannot be written.
+        ValueError: The folder belongs to another plan, or cannot be written.
     """
     copy = folder / "plan.toml"
     try:
@@ -141,14 +144,14 @@ def claim_folder(folder: Path, plan: Path) -> None:
         raise ValueError(f"--out {folder}: {error.strerror}") from error
     if not same:
         raise ValueError(
-            f"--out {folder}: was made with another plan ({copy}); say another folder"
+            f"--out {folder}: it belongs to another plan ({copy}); give another folder"
         )
 
 
 def _new_folder(folder: Path, role: str) -> tuple[int, Path]:
-    """Make a folder of the lowest free number; return both.
+    """Create a folder with the lowest free number; return both.
 
-    Several servers of one study may do so at the same time.
+    Several servers of one study can do this at the same time.
     """
     number = 0
     while True:
@@ -162,10 +165,10 @@ def _new_folder(folder: Path, role: str) -> tuple[int, Path]:
 
 
 def diaries(folder: Path) -> Iterator[Diary]:
-    """Yield the diaries of a study.
+    """Yield the event logs of a study.
 
     Raises:
-        ValueError: a diary of another format.
+        ValueError: An event log has another format.
     """
     for path in sorted(folder.glob(f"*/{DIARY}")):
         rows = []
@@ -173,7 +176,7 @@ def diaries(folder: Path) -> Iterator[Diary]:
             try:
                 rows.append(json.loads(line))
             except json.JSONDecodeError:
-                break  # The last line before the machine went down.
+                break  # This is the last line before a crash.
         if rows and rows[0]["format"] != FORMAT:
             raise ValueError(f"{path}: format {rows[0]['format']}, expected {FORMAT}")
         if rows:
@@ -181,14 +184,14 @@ def diaries(folder: Path) -> Iterator[Diary]:
 
 
 def erase(folder: Path, code: str) -> int:
-    """Delete all that is kept of a person; return the number of files.
+    """Delete all data of a person; return the number of files.
 
-    The games that the person played as somebody's opponent go, too, and reports that
-    were made in the folder. A line without a code stays in ``erased.jsonl``: when it
-    was, and of which number.
+    This includes games as the opponent of another participant, and reports in the
+    folder. A line with time and number, but without the code, is added to
+    ``erased.jsonl``.
 
     Raises:
-        ValueError: a code of which there is nothing.
+        ValueError: There are no data of this code.
     """
     gone = 0
     number = None
@@ -202,7 +205,7 @@ def erase(folder: Path, code: str) -> int:
             gone += sum(p.is_file() for p in path.rglob("*"))
             shutil.rmtree(path)
     if not gone:
-        raise ValueError(f"{folder}: there is nothing of {code!r}")
+        raise ValueError(f"{folder}: it contains no data of {code!r}")
     for name in REPORTS:
         (folder / name).unlink(missing_ok=True)
     with (folder / "erased.jsonl").open("a") as log:

@@ -1,4 +1,4 @@
-"""Course of a participant: practice, blocks of games, questions, breaks."""
+"""Course of a participant: practice, blocks of games, questions and breaks."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from marl_airhockey.play.study.plan import Opponent, Plan
 RESULT_SHOWN = 2.5
 """Time for which the result of a game is shown, s."""
 BROKEN_OFF = "broken off"
-"""Result of a game that does not count."""
+"""Result of an aborted game, which does not count."""
 
 
 class Course:
-    """Position of a participant in a plan; resumes where the diary ends.
+    """Position of a participant in a plan, which resumes at the end of the event log.
 
     Args:
-        plan: of the study.
-        diary: of the participant.
+        plan: Plan of the study.
+        diary: Event log of the participant.
     """
 
     def __init__(self, plan: Plan, diary: Diary) -> None:
@@ -27,11 +27,11 @@ class Course:
         """One of: ready, match, over, questions, rest, end."""
         self._recording = ""
         self.time_left = 0.0
-        """Rest of a break, or of the time for which a result is shown, s."""
+        """Remaining time of a break, or of the display of a result, s."""
         self.block = 0
         """Index of the block; -1 for practice."""
         self.game = 0
-        """Number of this block's games that are over."""
+        """Number of completed games of this block."""
         self._answers: dict[str, int | str] = {}
         self._begin_block(-1 if plan.practice else 0)
         for row in list(diary.rows):
@@ -44,7 +44,7 @@ class Course:
 
     @property
     def opponent(self) -> Opponent | None:
-        """Opponent of this block; None in a game of one seat, and at the end."""
+        """Opponent of this block; None in a game with one seat, and at the end."""
         plan, block = self.plan, self.block
         if not plan.opponents or block == plan.blocks:
             return None
@@ -63,7 +63,7 @@ class Course:
 
     @property
     def position(self) -> dict[str, Any]:
-        """Position in the plan as recordings and the diary have it, counted from 1."""
+        """Position in the plan for recordings and the event log, counted from 1."""
         return {
             "block": self.block + 1,
             "game": self.game + 1,
@@ -72,24 +72,24 @@ class Course:
         }
 
     def begin(self) -> None:
-        """Begin the next game of the block."""
+        """Start the next game of the block."""
         self.diary.write("begin", **self.position)
         self.stage, self._recording = "match", ""
 
     def note_recording(self, name: str) -> None:
-        """Note the recording of the game that runs, which a crash may cut off."""
+        """Log the recording of the running game, in case of a crash."""
         if name != self._recording:
             self._recording = name
             self.diary.write("recording", recording=name)
 
     def end_game(self, result: str, **facts: Any) -> None:
-        """Note a game in the diary; one that was broken off is played again."""
+        """Log the end of a game; an aborted game is played again."""
         self.diary.write("game", **self.position, result=result, **facts)
         self.game += result != BROKEN_OFF
         self.stage, self.time_left = "over", RESULT_SHOWN
 
     def advance(self, seconds: float) -> None:
-        """Advance the clock; it ends the display of a result and a break."""
+        """Advance the clock, which ends the display of a result and a break."""
         self.time_left = max(self.time_left - seconds, 0.0)
         if self.time_left == 0.0 and self.stage == "over":
             self._next_stage()
@@ -97,10 +97,10 @@ class Course:
             self.stage = "ready"
 
     def answer(self, question: str, value: int) -> None:
-        """Take an answer; with the last one the block is over.
+        """Store an answer; the last answer ends the block.
 
         Raises:
-            ValueError: a question or a value that the plan does not have.
+            ValueError: The plan does not have this question or value.
         """
         questions = {q.id: q for q in self.plan.questions}
         if question not in questions or not 1 <= value <= questions[question].largest:
@@ -108,17 +108,17 @@ class Course:
         self._take(question, value)
 
     def comment(self, question: str, text: str) -> None:
-        """Take an answer in words, which may be empty.
+        """Store an answer to a free question, which may be empty.
 
         Raises:
-            ValueError: a question that the plan does not have, or not for words.
+            ValueError: The plan does not have this free question.
         """
         if question not in [q.id for q in self.plan.questions if q.free]:
             raise ValueError(f"comment: {question} is not in the plan")
         self._take(question, text.strip())
 
     def _take(self, question: str, answer: int | str) -> None:
-        """Keep an answer; with the last one, write all and begin the next block."""
+        """Store an answer; after the last one, log all and start the next block."""
         if self.stage != "questions":
             return
         self._answers[question] = answer
@@ -141,7 +141,7 @@ class Course:
         self._begin_block(self.block + 1)
 
     def _begin_block(self, block: int) -> None:
-        """Begin a block; -1 is practice."""
+        """Start a block; -1 is practice."""
         self.block, self.game, self._answers = block, 0, {}
         if block == self.plan.blocks:
             self.stage = "end"
@@ -152,7 +152,7 @@ class Course:
         self.stage = "rest" if self.time_left else "ready"
 
     def _next_stage(self) -> None:
-        """Begin the next game, the questions or the next block."""
+        """Start the next game, the questions or the next block."""
         self.stage = "ready"
         if self.game == self.games:
             if self.block < 0 or not self.plan.questions:
@@ -161,7 +161,7 @@ class Course:
                 self.stage = "questions"
 
     def _replay(self, row: dict[str, Any]) -> None:
-        """Repeat what a line of the diary has noted."""
+        """Apply a row of the event log."""
         if row["kind"] == "game" and row["result"] != BROKEN_OFF:
             self.game += 1
             self._next_stage()

@@ -1,4 +1,4 @@
-"""Opponents of a plan, at the table."""
+"""Opponents of a plan as drivers of a match."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ from marl_airhockey.policies.trust import Trust
 
 
 def open_match(plan: Plan) -> LiveMatch:
-    """Return the match of a plan, in which each opponent has been seated once.
+    """Return the match of a plan, after checking that every opponent can play.
 
     Raises:
-        ValueError: a plan that cannot be played; names the opponent.
+        ValueError: The plan cannot be played.
     """
     match = LiveMatch(
         plan.scenario,
         {},
         {"backend": plan.backend, "profile": plan.profile, "options": plan.options},
     )
-    # A plan may come from elsewhere, and nobody looks at what it loads.
+    # A plan can come from an untrusted source, so it must not load pickled code.
     Trust.answer = False
     seats = len(match.seats)
     if (seats == 1) != (not plan.opponents):
         needs = "no opponents" if seats == 1 else "opponents"
         raise ValueError(f"opponents: {plan.scenario} needs {needs}")
     if seats != 2 and PERSON in [opponent.name for opponent in plan.opponents]:
-        raise ValueError("opponents: a person can be one in a game of two seats alone")
+        raise ValueError("opponents: a person can only be one in a game with two seats")
     for opponent in (plan.practice_opponent, *plan.opponents):
         seat_opponent(match, opponent)
     return match
 
 
 def seat_opponent(match: LiveMatch, opponent: Opponent) -> None:
-    """Give all seats but the participant's to an opponent."""
+    """Set an opponent as the driver of all seats except the participant's."""
     match.set_handicap(opponent.handicap)
     for i in range(1, len(match.seats)):
         match.set_driver(i, opponent.name)

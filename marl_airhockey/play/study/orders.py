@@ -1,4 +1,4 @@
-"""Orders in which a study's participants play the opponents."""
+"""Orders in which the participants of a study play the opponents."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy as np
 def _balanced(count: int, seed: int, number: int) -> list[int]:
     """Return a row of a Latin square that is balanced for carry-over effects.
 
-    In all rows together each opponent follows each other one equally often (Williams,
-    1949): for an even number of opponents one square does it, for an odd one its mirror
-    image is the other half. The seed draws which opponent is which letter.
+    In all rows together, each opponent follows each other opponent equally often
+    (Williams, 1949). For an even number of opponents this needs one square. For an odd
+    number the mirror image of the square is the second half. The seed determines which
+    opponent is which letter.
     """
     first = [0]
     for k in range(1, count):
@@ -33,7 +34,7 @@ def _random(count: int, seed: int, number: int) -> list[int]:
 
 
 def _fixed(count: int, seed: int, number: int) -> list[int]:
-    """Return the order of the plan for everybody."""
+    """Return the order of the plan for all participants."""
     return list(range(count))
 
 

@@ -1,4 +1,4 @@
-"""Contents of the messages that pages get in a study, JSON."""
+"""Contents of the messages that pages receive in a study, as JSON."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ def texts(plan: Plan) -> dict[str, Any]:
 
 
 def seat_rows(course: Course | None, seats: int) -> list[dict[str, Any]]:
-    """Return a row for each seat, with no more of the opponent than the plan allows."""
+    """Return a row for each seat; the opponent is described as the plan allows."""
     title = course.title if course else ""
     other = {"driver": title, "taken": True, "title": title}
     return [{"driver": PERSON, "taken": course is not None}] + [other] * (seats - 1)
 
 
 def progress(course: Course, waits: bool) -> dict[str, Any]:
-    """Return a participant's position in the plan.
+    """Return the position of a participant in the plan.
 
     Args:
-        course: of the participant.
-        waits: True if a person is missing at another seat.
+        course: Course of the participant.
+        waits: True if a person is missing in another seat.
     """
     ended = course.stage == "end"
     return {
@@ -43,11 +43,11 @@ def progress(course: Course, waits: bool) -> dict[str, Any]:
         "games": course.games,
         "time_left": round(course.time_left),
         "waits": waits,
-        # Not before: it says whom one has played against.
+        # The debriefing names the opponents, so it is only sent at the end.
         "debriefing": paragraphs(course.plan.debriefing) if ended else [],
     }
 
 
 def paragraphs(text: str) -> list[str]:
-    """Return the paragraphs of a text, which have a blank line between them."""
+    """Return the paragraphs of a text, which are separated by blank lines."""
     return text.strip().split("\n\n") if text.strip() else []

@@ -1,4 +1,4 @@
-"""People who take part in a study that runs."""
+"""People who take part in a running study."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from marl_airhockey.play.study.course import Course
 
 @dataclass
 class Person:
-    """Somebody who has agreed to take part."""
+    """Person who has agreed to take part."""
 
     key: str
-    """Key of their page."""
+    """Key of the person's page."""
     diary: Diary
     last_seen: float
-    """Time at which their page was last connected, s."""
+    """Time at which the person's page was last connected, s."""
 
 
 @dataclass
 class Participant(Person):
-    """Person who goes through the plan."""
+    """Person who follows the plan."""
 
     course: Course
 
     @property
     def at_end(self) -> bool:
-        """True if the plan is done."""
+        """True if the participant has completed the plan."""
         return self.course.stage == "end"

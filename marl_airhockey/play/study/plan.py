@@ -1,4 +1,4 @@
-"""Plan of a study: the opponents, their order, the questions."""
+"""Plan of a study: opponents, their order, and questions."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from marl_airhockey.registry import DEFAULT_BACKEND, runs_code
 from marl_airhockey.sim.core.checks import check_fields
 
 EXAMPLE = Path(__file__).parent / "example.toml"
-"""Example of a plan's file."""
+"""Example of a plan file."""
 SCALE_POINTS = 7
-"""Points of the scale on which a question is answered."""
+"""Number of points of the scale of a question."""
 
 
 @dataclass(frozen=True)
 class Question:
     """Question after a block, answered on a scale from 1 to `SCALE_POINTS`.
 
-    With ``choices`` it is answered by one of them instead, the first being 1.
+    A question with ``choices`` is answered by the number of one of them, from 1.
 
     Raises:
-        ValueError: an id of other characters than a-z, 0-9, _; a single choice.
+        ValueError: The id has other characters than a-z, 0-9 and _, there is a single
+            choice, or a free question has choices or a scale.
     """
 
     id: str
@@ -37,20 +38,22 @@ class Question:
     """Label of the upper end of the scale."""
     choices: tuple[str, ...] = ()
     free: bool = False
-    """True for one that is answered in words, or not at all."""
+    """True for a question that is answered by a text, which may be empty."""
 
     def __post_init__(self) -> None:
         check_fields(self)
         if not re.fullmatch(r"[a-z0-9_]+", self.id):
-            raise ValueError(f"id: {self.id!r} must be of a-z, 0-9 and _")
+            raise ValueError(f"id: {self.id!r} must consist of a-z, 0-9 and _")
         if len(self.choices) == 1:
-            raise ValueError(f"choices: {self.id} needs at least two")
+            raise ValueError(f"choices: {self.id} needs at least two choices")
         if self.free and (self.choices or self.low or self.high):
-            raise ValueError(f"free: {self.id} has neither choices nor a scale")
+            raise ValueError(
+                f"free: {self.id} is free, so it must not have choices, low or high"
+            )
 
     @property
     def largest(self) -> int:
-        """Largest answer; the smallest is 1. 0 for one that is answered in words."""
+        """Largest answer; the smallest answer is 1. It is 0 for a free question."""
         return 0 if self.free else len(self.choices) or SCALE_POINTS
 
 
@@ -73,32 +76,32 @@ QUESTIONS = {
         ),
     )
 }
-"""Questions that a plan can name by their id alone."""
+"""Questions that a plan can name by their id."""
 
 
 def refuse_code(name: str) -> None:
-    """Refuse a name that is Python code: a plan may come from elsewhere.
+    """Check that a name is not Python code, because a plan can be untrusted.
 
     Raises:
-        ValueError: such a name.
+        ValueError: The name is Python code.
     """
     if runs_code(name):
         raise ValueError(
-            f"{name}: a plan runs no code; name a driver or scenario of ours or of an "
-            "installed package, or an .npz or .onnx file"
+            f"{name}: a plan cannot run Python code; give a driver or scenario of this "
+            "library or of an installed package, or an .npz or .onnx file"
         )
 
 
 @dataclass(frozen=True)
 class Opponent:
-    """Driver of all seats but the participant's in a block.
+    """Driver of all seats except the participant's in a block.
 
     Raises:
-        ValueError: a person with a handicap.
+        ValueError: A person has a handicap, or the name is Python code.
     """
 
     name: str
-    """Name or path of a driver, or "person": somebody at another page."""
+    """Name or path of a driver, or "person" for a person at another page."""
     label: str = ""
     """Name in recordings and reports; by default the name and the handicap."""
     handicap: Handicap = field(default_factory=Handicap)
@@ -116,33 +119,34 @@ class Opponent:
 
 @dataclass(frozen=True)
 class Plan:
-    """Course of a study, the same for each participant but for the order.
+    """Course of a study, which only differs in the order between participants.
 
     Raises:
-        ValueError: a value out of range, or one that is there twice; names the field.
+        ValueError: A value is out of range, or is given twice.
     """
 
     scenario: str
     information: str
-    """Text that participants read before they agree; paragraphs are kept."""
+    """Text that participants read before they agree, with blank lines between
+    paragraphs."""
     agree: tuple[str, ...]
-    """Statements that they tick."""
+    """Statements that participants tick."""
     version: str
-    """Version of these texts, kept with each consent."""
+    """Version of these texts, which is stored with each consent."""
     title: str = "Air hockey"
     thanks: str = "Thank you for taking part."
     debriefing: str = ""
-    """What participants are told at the end; paragraphs with a blank line between."""
+    """Text that participants read at the end, with blank lines between paragraphs."""
     opponents: tuple[Opponent, ...] = ()
-    """Opponents, a block each; none for a scenario of one seat."""
+    """Opponents of the blocks; none for a scenario with one seat."""
     order: str = "balanced"
-    """Name in `orders.ORDERS`."""
+    """Name of the order in `orders.ORDERS`."""
     seed: int = 0
     """Seed of the order."""
     games: int = 3
-    """Games of a block."""
+    """Number of games of a block."""
     practice: int = 1
-    """Games before the first block, which no report counts; 0 for none."""
+    """Number of games before the first block, which do not count; 0 for none."""
     practice_opponent: Opponent = Opponent("allround:strength=weak")
     rest: float = 30.0
     """Shortest break between blocks, s."""
@@ -161,9 +165,9 @@ class Plan:
         refuse_code(self.scenario)
         if self.order not in ORDERS:
             known = ", ".join(ORDERS)
-            raise ValueError(f"order: {self.order!r} is unknown; there are {known}")
+            raise ValueError(f"order: {self.order!r}; expected one of {known}")
         if not self.agree:
-            raise ValueError("agree: participants must have a line to agree to")
+            raise ValueError("agree: expected at least one statement")
         if self.seed < 0:
             raise ValueError(f"seed: {self.seed} must be at least 0")
         for name, keys in (
@@ -172,13 +176,17 @@ class Plan:
         ):
             twice = {key for key in keys if keys.count(key) > 1}
             if twice:
-                raise ValueError(f"{name}: {', '.join(sorted(twice))} is there twice")
+                raise ValueError(f"{name}: {', '.join(sorted(twice))} is given twice")
 
     @property
     def blocks(self) -> int:
-        """Number of blocks that a participant plays, practice not counted."""
+        """Number of blocks of a participant, without practice."""
         return max(len(self.opponents), 1)
 
     def sequence(self, number: int) -> list[int]:
-        """Return the order of opponents, by index, of a participant, counted from 0."""
+        """Return the indices of the opponents of a participant, in order.
+
+        Args:
+            number: Number of the participant, from 0.
+        """
         return ORDERS[self.order](self.blocks, self.seed, number)

@@ -1,4 +1,4 @@
-"""Reader of plans in TOML, which names the key that is wrong."""
+"""Reader of plans in TOML files."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from marl_airhockey.sim.core.checks import build, check_fields
 
 @dataclass(frozen=True)
 class _OpponentTable:
-    """Keys of an opponent in the file."""
+    """Keys of an opponent in a plan file."""
 
     name: str
     label: str = ""
     reaction: float = Handicap.reaction
-    """Delay of its actions, s."""
+    """Latency of the actions, s."""
     noise: float = Handicap.noise
     pace: float = Handicap.pace
 
@@ -29,10 +29,10 @@ class _OpponentTable:
 
 
 def load_plan(path: Path) -> Plan:
-    """Read a plan from TOML.
+    """Read a plan from a TOML file.
 
     Raises:
-        ValueError: names the file and the key that is wrong.
+        ValueError: The file cannot be read, or the value of a key is invalid.
     """
     try:
         text = path.read_text()
@@ -40,7 +40,7 @@ def load_plan(path: Path) -> Plan:
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: no TOML: {error}") from error
+        raise ValueError(f"{path}: not a TOML file: {error}") from error
     try:
         for name, read in (("opponents", _opponent), ("questions", _question)):
             if isinstance(data.get(name), list):
@@ -49,14 +49,14 @@ def load_plan(path: Path) -> Plan:
             data["practice_opponent"] = _opponent(data["practice_opponent"])
         digest = hashlib.sha256(text.encode()).hexdigest()[:12]
         if "digest" in data:
-            raise ValueError("digest: unknown; it is made from the file")
+            raise ValueError("digest: this key is computed from the file; remove it")
         return build(Plan, {**data, "digest": digest})
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
 
 
 def _opponent(row: Any) -> Opponent:
-    """Return the opponent of a name or a table."""
+    """Return the opponent that a name or a table describes."""
     named = {"name": row} if isinstance(row, str) else row
     table = build(_OpponentTable, named, "opponents")
     try:
@@ -67,12 +67,12 @@ def _opponent(row: Any) -> Opponent:
 
 
 def _question(row: Any) -> Question:
-    """Return the question of an id or a table."""
+    """Return the question that an id or a table describes."""
     if not isinstance(row, str):
         return build(Question, row, "questions")
     if row not in QUESTIONS:
         raise ValueError(
-            f"questions: {row!r} is not shipped ({', '.join(QUESTIONS)} are): "
-            'write your own as {id = "...", text = "..."}'
+            f"questions: unknown id {row!r}; expected one of {', '.join(QUESTIONS)}, "
+            'or your own question {id = "...", text = "..."}'
         )
     return QUESTIONS[row]

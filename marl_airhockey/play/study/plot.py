@@ -13,7 +13,7 @@ from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
 
 
 def plot_answers(rows: Sequence[dict[str, Any]], path: Path) -> None:
-    """Write a PNG of the rows of `tables.by_question`, a panel for each question."""
+    """Write a PNG of the rows of `tables.by_question`, with a panel per question."""
     questions = list(dict.fromkeys(row["question"] for row in rows))
     opponents = list(dict.fromkeys(row["opponent"] for row in rows))
     figure, grid = plt.subplots(

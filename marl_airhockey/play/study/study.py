@@ -1,4 +1,4 @@
-"""Session of a study: consent, practice, blocks of games, questions, breaks."""
+"""Session of a study: consent, practice, blocks of games, questions and breaks."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def open_study(plan: Plan, folder: Path) -> Session:
         folder: Folder of the study.
 
     Raises:
-        ValueError: An opponent that cannot play the plan's scenario.
+        ValueError: An opponent cannot play the scenario of the plan.
     """
     return Session(Study(plan, folder, Seats(open_match(plan))))
 
 
 class Study(Host):
-    """Host that takes one participant after the other through a plan.
+    """Host that guides one participant after the other through a plan.
 
     Args:
         plan: Plan of the study.
@@ -44,7 +44,7 @@ class Study(Host):
         seats: Seats of the match.
 
     Raises:
-        ValueError: An opponent that cannot play the plan's scenario.
+        ValueError: An opponent cannot play the scenario of the plan.
     """
 
     def __init__(self, plan: Plan, folder: Path, seats: Seats) -> None:
@@ -62,7 +62,7 @@ class Study(Host):
             "withdraw": self.people.withdraw,
             "next": self.people.next_person,
         }
-        # Everything is played once, so that nothing is compiled in a session.
+        # Every opponent plays once, so that nothing is compiled during a session.
         opponents = list(plan.opponents)
         if opponents and plan.practice:
             opponents.insert(0, plan.practice_opponent)
@@ -81,12 +81,12 @@ class Study(Host):
         return self.people.recorder
 
     def before_message(self) -> None:
-        """Between games, look for people who were erased."""
+        """Dismiss people who were erased, between games."""
         if self.match.phase not in ("play", "countdown"):
             self.people.dismiss_erased()
 
     def check_presence(self, now: float) -> None:
-        """Pause for people who are idle; dismiss those who stay away."""
+        """Pause for people who are idle; dismiss people who are absent too long."""
         self.people.check_presence(now)
 
     def _pause(self, client: Client) -> None:
@@ -126,7 +126,7 @@ class Study(Host):
         self.people.prepare()
 
     def _end_game(self, course: Course) -> None:
-        """Note the game that is over."""
+        """Log the game that has ended."""
         match, recorder = self.match, self.recorder
         memory = {name: value[0] for name, value in match.world.memory.items()}
         scenario = match.world.scenario
@@ -147,7 +147,7 @@ class Study(Host):
 
     @property
     def _result(self) -> str:
-        """Result of a game for the participant; a task is won by its success."""
+        """Result of a game for the participant; success in a task is a win."""
         match = self.match
         if match.reason:
             return BROKEN_OFF
@@ -169,7 +169,7 @@ class Study(Host):
             self.people.prepare()
 
     def describe(self) -> dict[str, Any]:
-        """Return what a page gets once: the match and the texts of the study; JSON."""
+        """Return the JSON that a page receives once: the match and the texts."""
         return {
             **self.match.describe(),
             "choices": [],
@@ -178,7 +178,7 @@ class Study(Host):
         }
 
     def status(self) -> dict[str, Any]:
-        """Return what all pages get of opponents: only what the plan allows."""
+        """Return the data about opponents that the plan allows, for all pages."""
         participant = self.people.participant
         course = participant.course if participant else None
         seats = seat_rows(course, len(self.match.seats))

@@ -1,4 +1,4 @@
-"""Tables of a study: by question, by opponent, by participant and by order."""
+"""Tables of a study by question, opponent, participant and order."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ from marl_airhockey.play.study.plan import SCALE_POINTS
 
 Row = dict[str, Any]
 LEGEND = (
-    f"Answers: means of 1 to {SCALE_POINTS}, or, with a choice, the share that chose "
-    "it. Score: win + draw / 2. Intervals are over participants, whose games are not "
-    f"independent; none of fewer than {FEWEST_GROUPS}. Games that were broken off or "
-    "cut off, and practice, do not count."
+    f"Answers: means on a scale from 1 to {SCALE_POINTS}, or the share of participants "
+    "with this choice. Score: win + draw / 2. Intervals are over participants, because "
+    "the games of a participant are not independent. There is no interval for fewer "
+    f"than {FEWEST_GROUPS} participants. Games that were aborted or interrupted, and "
+    "practice games, do not count."
 )
 
 
 def by_question(found: Answers) -> list[Row]:
-    """Return rows by question and opponent: the mean answer.
+    """Return the mean answers as rows by question and opponent.
 
-    ``mean`` is a list (mean, low, high) with the 95 % interval, nan without one. A
-    question with choices has a row for each choice instead: the share that chose it.
-    ``scale`` is the largest possible value.
+    ``mean`` is a list (mean, low, high) with the 95 % interval, or nan for no interval.
+    A question with choices has a row for each choice, with the share of participants
+    who chose it. ``scale`` is the largest possible value.
     """
     rows: list[Row] = []
     answers = [row for row in found.answers if row["value"] is not None]
@@ -54,7 +55,7 @@ def by_question(found: Answers) -> list[Row]:
 
 
 def by_opponent(found: Answers) -> list[Row]:
-    """Return the score against each opponent, over participants."""
+    """Return the score against each opponent with its interval over participants."""
     games = found.counted()
     rows = []
     for opponent in sorted({game["opponent"] for game in games}):
@@ -66,7 +67,7 @@ def by_opponent(found: Answers) -> list[Row]:
 
 
 def by_participant(found: Answers) -> list[list[object]]:
-    """Return the table of points of each participant by opponent; header first."""
+    """Return a table of points by participant and opponent; the header is first."""
     games = found.counted()
     opponents = sorted({game["opponent"] for game in games})
     rows: list[list[object]] = [["number", "participant", *opponents]]
@@ -82,7 +83,7 @@ def by_participant(found: Answers) -> list[list[object]]:
 
 
 def order_table(found: Answers) -> list[list[object]]:
-    """Return the scores by opponent and block; header first."""
+    """Return a table of scores by opponent and block; the header is first."""
     games = found.counted()
     blocks = sorted({game["block"] for game in games})
     rows: list[list[object]] = [["opponent", *(f"block {block}" for block in blocks)]]
@@ -113,7 +114,7 @@ def to_markdown(found: Answers) -> str:
     header, *people = by_participant(found)
     order, *positions = order_table(found)
     lines = [
-        f"# {found.participants} participants, {found.complete} to the end",
+        f"# {found.participants} participants, {found.complete} complete",
         *("", "## Answers", ""),
         *markdown(("question", "opponent", "participants", "mean (95 %)"), questions),
         *("", "## Score by opponent", ""),
@@ -147,7 +148,7 @@ def _pairs(rows: Sequence[Row], *names: str) -> Iterable[tuple[str, ...]]:
 
 
 def _groups(rows: Sequence[Row], value: Callable[[Row], float]) -> list[list[float]]:
-    """Return values in groups, a participant each."""
+    """Return values in groups, one for each participant."""
     found: dict[str, list[float]] = {}
     for row in rows:
         found.setdefault(row["participant"], []).append(value(row))

@@ -68,12 +68,12 @@ function updateRealTable() {
   const t = now.table, pair = (v) => `${v[0].toFixed(2)}, ${v[1].toFixed(2)} m/s`;
   const rows = [
     ["robot", t.fault === "none" ? t.robot.toLowerCase() : `${t.robot.toLowerCase()}: ${t.fault}`],
-    ["asked", pair(t.asked)], ["sent", pair(t.sent)],
+    ["commanded", pair(t.asked)], ["sent", pair(t.sent)],
     ["paddle above table", `${t.height_mm.toFixed(1)} mm, ${t.force.toFixed(0)} N`],
-    ["video", t.drawn_ms === null ? "off" : `drawn ${t.drawn_ms.toFixed(0)} ms after it was taken`],
-    ["camera", t.camera || `newest picture ${t.frame_ms.toFixed(0)} ms old, ${t.dropped} dropped`],
-    ["puck", t.puck_ms === null ? "none" : `seen ${t.puck_ms.toFixed(0)} ms ago, noise ${t.noise_mm.toFixed(1)} mm`],
-    ["cycles", `${t.cycles}, ${t.late} late, ${t.refused} commands refused`],
+    ["video", t.drawn_ms === null ? "off" : `displayed ${t.drawn_ms.toFixed(0)} ms after the exposure`],
+    ["camera", t.camera || `newest frame ${t.frame_ms.toFixed(0)} ms old, ${t.dropped} dropped`],
+    ["puck", t.puck_ms === null ? "none" : `detected ${t.puck_ms.toFixed(0)} ms ago, noise ${t.noise_mm.toFixed(1)} mm`],
+    ["cycles", `${t.cycles}, ${t.late} late, ${t.refused} commands rejected`],
   ];
   const text = JSON.stringify(rows);
   if (text === shown) return;

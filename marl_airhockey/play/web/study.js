@@ -26,7 +26,7 @@ const SHEETS = {
     return [element("h1", title), ...information.map((text) => element("p", text)), ...boxes, go];
   },
   questions() {
-    const { questions } = match.study, go = button("Go on", sendAnswers), fields = questions.map(fieldOf);
+    const { questions } = match.study, go = button("Continue", sendAnswers), fields = questions.map(fieldOf);
     function fieldOf(question) {
       if (question.free) {
         const field = element("fieldset"), box = element("textarea");
@@ -59,16 +59,16 @@ const SHEETS = {
   },
   end() {
     return [
-      element("h1", "That was all"), element("p", match.study.thanks), ...now.study.debriefing.map((text) => element("p", text)), element("p", `Your code is ${now.study.code}. With it you can have your data erased later.`),
+      element("h1", "The study is complete"), element("p", match.study.thanks), ...now.study.debriefing.map((text) => element("p", text)), element("p", `Your code is ${now.study.code}. You can use it to have your data erased later.`),
       button("Next participant", () => { send("next"); another(); }),
     ];
   },
   erased() {
-    return [element("h1", "Erased"), element("p", "All that was recorded of you has been erased. Thank you."), button("Next participant", () => { send("next"); another(); })];
+    return [element("h1", "Erased"), element("p", "All your data have been erased. Thank you."), button("Next participant", () => { send("next"); another(); })];
   },
   leaving() {
     return [
-      element("h1", "Withdraw?"), element("p", "This ends your part and erases at once all that was recorded of you."),
+      element("h1", "Withdraw?"), element("p", "This ends your participation and immediately erases all your data."),
       button("Erase everything", () => { leaving = false; send("withdraw"); }), button("Stay", () => { leaving = false; }),
     ];
   },
@@ -96,7 +96,7 @@ function updateStudyWords() {
   const { block, game, games, time_left, waits } = now.study, where = block < 0 ? "Practice" : `Part ${block + 1} of ${match.study.blocks}`;
   if (down) show("No connection", refused || "trying again…", "");
   else if (stage === "busy") show("A session is running", "Please wait until it is over.", "");
-  else if (stage === "partner" && now.phase !== "play" && now.phase !== "countdown" && now.phase !== "pause") show("Please wait", "You play in a part of this session. Thank you for taking part.", "");
+  else if (stage === "partner" && now.phase !== "play" && now.phase !== "countdown" && now.phase !== "pause") show("Please wait", "You play in some parts of this session. Thank you for taking part.", "");
   else if (stage === "partner" && !sits) show("Please wait", "You play in another part of this session.", "");
   else if (stage === "rest") show("A break", `${where} begins in ${time_left} s.`, "");
   else if (stage === "over") show(verdict(), why(), "");

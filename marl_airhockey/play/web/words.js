@@ -22,8 +22,8 @@ function updateWords() {
   put($("watching"), now.watching ? `${now.watching} watching` : "");
   put($("drivers"), now.seats.map((s) => s.driver).join(", "));
   const slow = linkRate() < 60 && performance.now() - openedAt > 3000;
-  const late = slow && now.link.ms > 50 ? `, ${(now.link.ms / 1000).toFixed(1)} s late` : "";
-  put($("link"), slow ? `slow: ${linkRate()} pictures a second${late}` : "");
+  const late = slow && now.link.ms > 50 ? `, ${(now.link.ms / 1000).toFixed(1)} s delay` : "";
+  put($("link"), slow ? `slow link: ${linkRate()} frames per second${late}` : "");
   $("recording").hidden = !now.recording && !now.not_recorded;
   put($("recording"), now.not_recorded ? `not recorded: ${now.not_recorded}` : "● recording");
   if (recording) { updateReplayWords(); return; }
@@ -56,10 +56,10 @@ function notice(sits, free, mayControl) {
   if (down) show("No connection", refused || "trying again…", "");
   else if (now.phase === "arrange") show("Getting ready", now.reason, "");
   else if (now.phase === "countdown") show(String(Math.ceil(now.time_left)), "", "", true);
-  else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player: they open this page, too." : sits ? `${match.what} ${howTo()}` : free >= 0 ? "A seat is free below." : "Waiting for the players.", mayControl ? "Start" : "");
-  else if (now.phase === "pause" && alone) show("Paused", `${sentence(now.reason)} You can wait, go on against the computer, or end the match.`, "Go on against the computer", false, "substitute");
-  else if (now.phase === "pause" && free >= 0 && !match.study) show("Paused", `${sentence(now.reason)} Who takes the free seat below begins a new match.`, "");
-  else if (now.phase === "pause") show(match.camera ? "Your word" : "Paused", now.reason, mayControl ? "Go on" : "");
+  else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player, who has to open this page." : sits ? `${match.what} ${howTo()}` : free >= 0 ? "A seat is free below." : "Waiting for the players.", mayControl ? "Start" : "");
+  else if (now.phase === "pause" && alone) show("Paused", `${sentence(now.reason)} You can wait, continue against the computer, or end the match.`, "Continue against the computer", false, "substitute");
+  else if (now.phase === "pause" && free >= 0 && !match.study) show("Paused", `${sentence(now.reason)} The player who takes the free seat below starts a new match.`, "");
+  else if (now.phase === "pause") show(match.camera ? "Please confirm" : "Paused", now.reason, mayControl ? "Continue" : "");
   else if (now.phase === "done") show(verdict(), why(), mayControl ? "Again" : "");
   else if (flash > 0.3) show("Goal!", "", "", true);
   else if (now.phase === "play" && atRest()) show("", atRest(), "", true);
@@ -80,12 +80,12 @@ const brokenOff = () => now.reason || (recording && recording.end.reason !== "pl
 // How a result has come about, where the goals alone do not say it.
 function why() {
   if (brokenOff() || new Set(match.seats.map((s) => s.team)).size === 1) return brokenOff();
-  if (now.decided_by === "shots on goal") return `It is level, so more shots on goal win: ${now.caption}.`;
-  return now.success.length ? "" : `Nobody is ahead: ${now.caption}.`;
+  if (now.decided_by === "shots on goal") return `Same number of goals. The team with more shots on goal wins: ${now.caption}.`;
+  return now.success.length ? "" : `Same score: ${now.caption}.`;
 }
 
 function verdict() {
-  if (brokenOff()) return "Broken off";
+  if (brokenOff()) return "Ended early";
   const teams = new Set(match.seats.map((s) => s.team)), won = new Set(now.success.map((i) => match.seats[i].team));
   if (teams.size === 1) return won.size ? "Done!" : "Not this time";
   if (won.size !== 1) return "A draw";
@@ -141,7 +141,7 @@ function seats(free) {
     if (i === now.seat || (seat.driver === "person" && seat.taken)) box.append(titleOf(i));
     else if (now.seat !== null && can && !match.study) {
       const list = document.createElement("select");
-      list.setAttribute("aria-label", `who plays seat ${i + 1}`);
+      list.setAttribute("aria-label", `player of seat ${i + 1}`);
       for (const name of [...new Set(["person", seat.driver, ...match.choices])]) {
         const option = new Option(name === "person" ? "Another person" : driverTitle(name), name);
         option.selected = name === seat.driver; list.append(option);

@@ -1,1 +1,1 @@
-"""Physics: paddle commands in, the next state out. No backend knows a scenario."""
+"""Backends: physics engines that compute the next state from paddle commands."""

@@ -1,4 +1,4 @@
-"""Finder of the simulated backends: the folders beside this file."""
+"""Finder of the simulated backends, which are the folders next to this file."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ def simulated_names() -> list[str]:
 
 
 def simulated_backend(name: str) -> type[Backend]:
-    """Return the class of a simulated backend, whether it can run here or not."""
+    """Return the class of a simulated backend, even if it cannot run here."""
     return cast(type[Backend], importlib.import_module(f"{__package__}.{name}").make)

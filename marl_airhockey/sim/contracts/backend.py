@@ -1,4 +1,4 @@
-"""Backend contract: paddle commands in, the next state out; B worlds at a time."""
+"""Backend contract: computes the next state of B worlds from paddle commands."""
 
 from __future__ import annotations
 
@@ -19,27 +19,28 @@ MAX_PRESCRIBED_SPEED = 12.0
 """Speed above which a position-driven paddle is raised and touches nothing, m/s."""
 
 PATIENCE = 0.1
-"""Time after which a puck without room beside a position-driven paddle is lifted, s."""
+"""Time after which a puck without space at a position-driven paddle is lifted, s."""
 MOMENTS = 10
 """Number of parts of a control step in a path, for backends without physics steps."""
 
 
 class Command(NamedTuple):
-    """Command of the paddles in a step, table frame; preallocated arrays."""
+    """Command of the paddles in a step, table frame, in preallocated arrays."""
 
     velocity: Array
-    """(B, seats, 2) m/s, reached at the end of the step by a linear ramp"""
+    """Velocities at the end of the step (B, seats, 2), m/s. The velocity is a linear
+    ramp."""
     prescribed: Array
-    """(B, seats, 4) position and velocity at the end of the step, m and m/s, of
-    position-driven paddles; nan for all others"""
+    """Positions and velocities of position-driven paddles at the end of the step
+    (B, seats, 4), m and m/s; nan for all others."""
     closed: Array
-    """(B, goal_lines) bool: wall in this step"""
+    """True for goal lines that are walls in this step (B, goal_lines)."""
     raised: Array
-    """(B, seats) bool: held above the table, so that it touches nothing"""
+    """True for paddles that are held above the table and touch nothing (B, seats)."""
 
     @staticmethod
     def still(scene: Scene, worlds: int) -> Command:
-        """Return a command to rest, freshly allocated."""
+        """Return a command that lets all paddles rest, freshly allocated."""
         seats = len(scene.seats)
         return Command(
             np.zeros((worlds, seats, 2)),
@@ -52,29 +53,32 @@ class Command(NamedTuple):
 class Backend(ABC):
     """Physics of B worlds with one scene.
 
-    Paddles follow their command and are not pushed back by a puck; one that is not
-    position-driven stops at an immovable (pinned) puck. A position-driven one that
-    leaves a puck no room for 0.1 s lifts it off the table. A backend can be copied and
-    pickled at any moment; the copy is independent.
+    Paddles follow their command, and pucks do not push them back. A paddle that is not
+    position-driven stops at an immovable (pinned) puck. If a position-driven paddle
+    leaves a puck no space for 0.1 s, the puck is lifted off the table. A backend can be
+    copied and pickled at any time. The copy is independent.
 
     Args:
         scene: Scene on the tables.
         num_worlds: Number of worlds, B.
-        control_dt: Time of a step, s.
-        substeps: Least number of physics steps in it; None for the backend's own.
+        control_dt: Length of a control step, s.
+        substeps: Smallest number of physics steps in a control step; None for the
+            default of the backend.
 
     Raises:
-        ValueError: Substeps for a backend that finds contacts at their moments.
+        ValueError: `substeps` is given, but the backend has no physics steps.
     """
 
     instant_contacts: ClassVar[bool] = True
-    """True if a contact takes no time: an impulse, so bounces have closed forms."""
+    """True if a contact is an impulse that takes no time. Bounces then have closed
+    forms."""
     tracks_commands: ClassVar[bool] = True
-    """True if paddles move exactly as commanded until something stops them. Where they
-    do not, an arm moves them: it has parameters of its own, and no servo is simulated
-    in addition."""
+    """True if paddles move exactly as commanded until something stops them. Otherwise
+    an arm moves them. The arm has its own parameters, and no servo is simulated in
+    addition."""
     timestep: ClassVar[float | None]
-    """Longest physics step unless ``substeps`` is given, s; None without such steps."""
+    """Longest physics step unless ``substeps`` is given, s; None for a backend without
+    physics steps."""
     viewpoints: ClassVar[tuple[str, ...]] = ()
     """Names of the viewpoints of `photograph`."""
 
@@ -88,11 +92,11 @@ class Backend(ABC):
         self.scene, self.num_worlds = scene, num_worlds
         self.control_dt = control_dt
         self.substeps = self._count(control_dt, substeps)
-        """Least number of physics steps in a control step; 0 without such steps."""
+        """Smallest number of physics steps in a control step; 0 if there are none."""
         self.moments = self.substeps or MOMENTS
-        """Number of equal parts of a control step in a path, which has a row more."""
+        """Number of equal parts of a control step in a path, which has one row more."""
         self._rest = scene.still_state(num_worlds)
-        """State before a `reset`; all states share its `visible`, read-only."""
+        """State before a `reset`. All states share its `visible`, read-only."""
         self._before = self._rest
 
     @classmethod
@@ -101,53 +105,62 @@ class Backend(ABC):
             return substeps or int(np.ceil(control_dt / cls.timestep - 1e-9))
         if substeps is not None:
             raise ValueError(
-                "substeps: this backend finds every contact at its moment and has no "
-                "physics steps; leave it out"
+                "substeps: this backend computes the time of every contact and has no "
+                "physics steps: omit substeps"
             )
         return 0
 
     @classmethod
     def available(cls) -> str | None:
-        """Return None, or the reason why it cannot run here and the fix."""
+        """Return None, or the reason why the backend cannot run here, with a remedy."""
         return None
 
     @classmethod
     def supports(cls, scene: Scene) -> str | None:
-        """Return None, or the reason why it cannot play this scene."""
+        """Return None, or the reason why the backend cannot play a scene."""
         return None
 
     @abstractmethod
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
-        """Set the parameters of some worlds, by index (W,); values are (B,) each."""
+        """Set the parameters of some worlds.
+
+        Args:
+            values: Values (B,) of the parameters, by name.
+            worlds: Indices (W,) of the worlds.
+        """
 
     def key_scatter(self, keys: Array, worlds: Array) -> None:
-        """Set the keys (B,), uint64, of the contacts' scatter in some worlds, by index.
+        """Set the keys of the contact noise in some worlds.
 
-        Their collisions are counted from 0 again. Nothing happens in a backend whose
-        contacts do not scatter.
+        Their collisions are counted from 0 again. A backend without contact noise does
+        nothing.
+
+        Args:
+            keys: Keys (B,), uint64.
+            worlds: Indices (W,) of the worlds.
         """
         return None
 
     def reset(self, state: State, worlds: Array) -> None:
-        """Reset some worlds, by index (W,), to rows of a state of all B.
+        """Reset some worlds, by index (W,), to rows of a state of all B worlds.
 
-        Bodies that touch in the state have touched before: they make no new contact
-        and no new crossing. The past of these worlds is forgotten.
+        Bodies that touch in the state count as in contact before. They make no new
+        contact and no new crossing. The past of these worlds is deleted.
         """
         self._before = state
 
     @abstractmethod
     def stage(self, command: Command, before: State, after: State) -> Stage:
-        """Return a step of ``control_dt`` between preallocated states, for all worlds.
+        """Return the stage of a control step of all worlds, on preallocated states.
 
-        It fills the `RESULTS` of ``after`` (and ``path``, if the scene has one);
-        ``before`` is the state that it filled last, or that of a `reset`.
+        It fills the `RESULTS` of ``after``, and its ``path`` if the scene has one.
+        ``before`` is the state that it filled last, or the state of a `reset`.
         """
 
     def step(self, command: Command) -> State:
         """Return the state after a step, freshly allocated.
 
-        For use without a `World`, which runs `stage` on preallocated arrays.
+        It is for use without a `World`, which runs `stage` on preallocated arrays.
         """
         after = self.empty_state()
         self.stage(command, self._before, after)()
@@ -167,10 +180,11 @@ class Backend(ABC):
     def photograph(
         self, world: int, viewpoint: str, marks: Sequence[Mark], width: int
     ) -> Array:
-        """Return (H, W, 3) uint8 of what one of the `viewpoints` shows of a world.
+        """Return an image (H, W, 3) uint8 of a world from one of the `viewpoints`.
 
         Raises:
-            RuntimeError: it cannot be drawn here; says what to install.
+            RuntimeError: The image cannot be rendered here. The message names what to
+                install.
         """
         raise NotImplementedError
 
@@ -180,17 +194,17 @@ class Backend(ABC):
 
 
 class LiveBackend(Backend):
-    """Backend of a real table: its states are measured.
+    """Backend of a real table, whose states are measured.
 
-    So no sensor, latency, noise or servo is simulated; a step takes as long as it
-    lasts; an episode begins with what `arrange` brings about; limits continue from the
-    last command, as measured velocities come late. There is one world.
+    There is one world, and a step takes real time. No sensor, latency, noise or servo
+    is simulated. An episode begins with the state that `arrange` returns. The limits
+    continue from the last command, because measured velocities are delayed.
     """
 
     @classmethod
     @abstractmethod
     def table_and_profile(cls, rig: str) -> tuple[str, str]:
-        """Return the names of a rig's table and of its robot's profile.
+        """Return the names of the table and the robot's profile in a rig file.
 
         Raises:
             ValueError: The file cannot be read.
@@ -205,23 +219,23 @@ class LiveBackend(Backend):
 
         Args:
             scene: Scene on the table.
-            control_dt: Time of a step, s.
+            control_dt: Length of a control step, s.
             rig: Path of the file that describes the devices.
-            physics: Ranges in which the physics of the table may lie.
+            physics: Ranges of the physics parameters of the table.
 
         Raises:
-            ValueError: The file is wrong, or of another table.
-            RuntimeError: A device does not answer, with the remedy.
+            ValueError: The file is not valid, or describes another table.
+            RuntimeError: A device does not respond. The message contains a remedy.
         """
 
     @abstractmethod
     def arrange(self, state: State) -> State:
         """Arrange the state in which an episode begins; return the measured state.
 
-        Called after `reset`.
+        It is called after `reset`.
 
         Raises:
-            RuntimeError: It cannot be arranged, with the reason.
+            RuntimeError: The state cannot be arranged. The message gives the reason.
         """
 
     @property
@@ -231,12 +245,15 @@ class LiveBackend(Backend):
 
     @abstractmethod
     def sight(self) -> Array:
-        """Return (B, pucks, 4) x, y, m, visibility and age, s, in the newest frame."""
+        """Return the pucks in the newest frame (B, pucks, 4).
+
+        The columns are x and y, m, visibility, and age, s.
+        """
 
     @abstractmethod
     def telemetry(self) -> dict[str, Any]:
-        """Return what the devices report; JSON values.
+        """Return the reports of the devices as JSON values.
 
-        The requested command, ``asked``, and the one that was ``sent``, m/s, are
-        among them.
+        They include the commanded velocity, ``asked``, and the velocity that was
+        ``sent`` to the robot, m/s.
         """

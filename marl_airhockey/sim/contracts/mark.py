@@ -1,4 +1,4 @@
-"""Mark: something to draw on the table that is no body."""
+"""Mark: a shape that is drawn on the table but is not a body."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Mark(NamedTuple):
     end: tuple[float, float] = (0.0, 0.0)
     """Second end, m."""
     radius: float = 0.0
-    """m"""
+    """Radius of a circle, m."""
     means: Meaning = "goal"
-    """Meaning of a circle: a goal, or a region with a reward, a cost or a drag"""
+    """Meaning of a circle: a goal, or a region with a reward, a cost or a drag."""
 
     @staticmethod
     def circle(centre: Array, radius: float, means: Meaning = "goal") -> Mark:

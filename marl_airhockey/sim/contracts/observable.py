@@ -1,6 +1,6 @@
-"""Observables: parts of an observation, with bounds, labels and ego frames.
+"""Observables: parts of an observation, with bounds and labels.
 
-Vectors are in the seat's ego frame, SI units.
+Vectors are in the seat's ego frame, in SI units.
 """
 
 from __future__ import annotations
@@ -19,23 +19,26 @@ from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array, Memory
 
 OBSERVE = ("velocity", "estimate", "history", "pixels")
-"""Forms of the puck in observations: position and velocity as they are sensed; the same
-estimated for now by a filter that knows the table; the last sensed positions, each with
-a visibility flag and the age of its frame, as a camera gives them; or pictures."""
+"""Observation types of pucks.
+
+``velocity``: the sensed position and velocity. ``estimate``: position and velocity for
+now, estimated by a filter with a model of the table. ``history``: the last sensed
+positions, each with a visibility flag and the age of its frame, as from a camera.
+``pixels``: images."""
 
 
 HISTORY = 5
 """Number of sensed positions of a puck in a history."""
 PENDING = 2
-"""Number of the last actions that are shown, which may still be on their way."""
+"""Number of last actions in an observation, which may not have taken effect yet."""
 FRAMES = 3
-"""Number of pictures on top of each other in pixels."""
+"""Number of stacked images in pixels."""
 
 
 class Element(NamedTuple):
     """Element of an observation.
 
-    ``(value - centre) / unit`` is of order one: the fixed scaling for a network.
+    ``(value - centre) / unit`` is of order one. Networks use it as a fixed scaling.
     """
 
     label: str
@@ -47,34 +50,34 @@ class Element(NamedTuple):
 
 @dataclass(frozen=True)
 class ObservationContext:
-    """Context that observables need to state their columns."""
+    """Context from which observables determine their columns."""
 
     scene: Scene
     observe: str
     top_speed: float
     reaction: float = 0.0
-    """Time by which seats see pucks and other paddles late, s"""
+    """Latency of pucks and other paddles by the rules of the game, s."""
 
     @property
     def extrapolates(self) -> bool:
-        """True if pucks are shown as they were and as they would be now."""
+        """True if delayed pucks are observed together with a prediction for now."""
         return self.reaction > 0.0 and self.observe != "history"
 
     @cached_property
     def extent(self) -> Array:
-        """(2,) largest |x| and |y| of the table in any seat's ego frame, m."""
+        """Largest |x| and |y| of the table in any seat's ego frame (2,), m."""
         corners = np.asarray(self.scene.table.vertices)
         rotated = [corners @ r.T for r in self.rotations]
         return np.asarray(np.max(np.abs(rotated), axis=(0, 1)))
 
     @cached_property
     def walls(self) -> Walls:
-        """Walls that pucks are brought forward by, table frame."""
+        """Walls for the prediction of pucks, table frame."""
         return Walls.of(self.scene)
 
     @cached_property
     def rotations(self) -> Array:
-        """(S, 2, 2) from the table frame to each seat's ego frame."""
+        """Rotations from the table frame to each seat's ego frame (S, 2, 2)."""
         return np.array([self.scene.table.rotation(s.side) for s in self.scene.seats])
 
     @cached_property
@@ -106,9 +109,9 @@ class ObservationContext:
 
 
 class EgoView:
-    """View from every seat of what it sees, and of its own paddle.
+    """Sensed state as seen from every seat, and the seat's own paddle.
 
-    With a reaction, state, memory and history are those of a moment in the past.
+    With a reaction time, state, memory and history are from a time in the past.
     """
 
     def __init__(
@@ -122,30 +125,31 @@ class EgoView:
     ) -> None:
         self.state, self.memory, self.scope = state, memory, scope
         self.history = history
-        """(..., HISTORY, pucks, 4) sensed x, y, visible, age (s), newest last"""
+        """Sensed x and y, m, visibility, and age, s, of the pucks
+        (..., HISTORY, pucks, 4), table frame, newest last."""
         self.requested = requested
-        """(..., PENDING, S, 2) requested actions, ego frames, newest last"""
+        """Requested actions (..., PENDING, S, 2), ego frames, newest last."""
         self.own, self.own_velocity = (self._own(x) for x in paddle)
-        """(..., S, 2) each seat's own paddle now, m and m/s"""
+        """Position and velocity of each own paddle now (..., S, 2), m and m/s."""
         self.puck = self.rotate(state.puck)
-        """(..., S, pucks, 2) m"""
+        """Positions of the pucks (..., S, pucks, 2), m."""
         self.puck_velocity = self.rotate(state.puck_velocity)
-        """(..., S, pucks, 2) m/s"""
+        """Velocities of the pucks (..., S, pucks, 2), m/s."""
         self.puck_edge = state.puck_edge[..., None, :]
-        """(..., 1, pucks) m/s, the same from every seat"""
+        """Speeds of the pucks' edges (..., 1, pucks), the same for all seats, m/s."""
 
     def kept(self, name: str) -> Array:
         """Return an array of the scenario's memory.
 
         Raises:
-            ValueError: there is none of this name.
+            ValueError: The memory contains no array with this name.
         """
         if name not in self.memory:
             raise ValueError(unknown_name("memory", name, self.memory))
         return self.memory[name]
 
     def rotate(self, vectors: Array) -> Array:
-        """Rotate (..., n, 2) of the table frame to ego frames, (..., S, n, 2)."""
+        """Rotate vectors (..., n, 2) from the table to ego frames (..., S, n, 2)."""
         seats = vectors[..., None, :, :]
         if self.scope.straight:
             return seats
@@ -154,9 +158,10 @@ class EgoView:
 
     @property
     def puck_predicted(self) -> tuple[Array, Array]:
-        """(..., S, pucks, 2) pucks, brought forward by the reaction if any, m and m/s.
+        """Positions and velocities of the pucks now (..., S, pucks, 2), m and m/s.
 
-        See `extrapolation.extrapolate`; what paddles did in that time is not known.
+        They are extrapolated over the reaction time, if there is one, see
+        `extrapolation.extrapolate`. The movements of paddles in this time are unknown.
         """
         if not self.scope.extrapolates:
             return self.puck, self.puck_velocity
@@ -166,7 +171,7 @@ class EgoView:
 
     @property
     def own_delayed(self) -> tuple[Array, Array]:
-        """(..., S, 2) each seat's own paddle at the moment that it sees, m and m/s."""
+        """Own paddles at the time of the sensed state (..., S, 2), m and m/s."""
         state = self.state
         return self._own(state.paddle), self._own(state.paddle_velocity)
 
@@ -182,7 +187,7 @@ class Observable(ABC):
     """Part of an observation."""
 
     goal: bool = False
-    """True for the wanted goal, which goals="dict" shows apart."""
+    """True for the desired goal, which is a separate entry with goals="dict"."""
 
     @abstractmethod
     def columns(self, scope: ObservationContext) -> list[Element]:
@@ -190,11 +195,11 @@ class Observable(ABC):
 
     @abstractmethod
     def write(self, ego: EgoView, out: Array) -> None:
-        """Put the numbers into ``out`` (..., S, columns)."""
+        """Write the numbers to ``out`` (..., S, columns)."""
 
 
 class ObservationLayout:
-    """Observables side by side: bounds, labels, and the numbers of an ego view."""
+    """Concatenated observables: bounds, labels, and the numbers of an ego view."""
 
     def __init__(
         self, observables: tuple[Observable, ...], scope: ObservationContext
@@ -213,7 +218,7 @@ class ObservationLayout:
             for observable, part in zip(observables, columns, strict=True)
             for _ in part
         )
-        """What each column is of: the first sentence of its observable's docstring"""
+        """Meaning of each column: the first sentence of its observable's docstring."""
         self.labels = tuple(column.label for column in flat)
         self.low = np.array([c.low for c in flat], np.float32)
         self.high = np.array([c.high for c in flat], np.float32)
@@ -221,7 +226,7 @@ class ObservationLayout:
         self.centre = np.array([c.centre for c in flat], np.float32)
 
     def read(self, ego: EgoView) -> Array:
-        """(..., S, columns) float32, inside the bounds."""
+        """Return the numbers (..., S, columns), float32, clipped to the bounds."""
         seats = len(self.scope.scene.seats)
         shape = (*ego.state.time.shape, seats, len(self.labels))
         out = np.empty_like(ego.state.position, shape=shape)

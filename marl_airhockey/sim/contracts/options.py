@@ -1,4 +1,4 @@
-"""Checks of the options that all scenarios share, and of the numbers among all."""
+"""Checks of the options that all scenarios share, and of all numeric options."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from marl_airhockey.sim.core.table import TABLES, Table
 CHOICES = {
     "seats": ("kind of seats", SEAT_KINDS),
     "table": ("table", TABLES),
-    "goals": ("form of goals", ("flat", "dict")),
+    "goals": ("type of goals", ("flat", "dict")),
     "rules": ("rules", ("own", "paper")),
 }
-"""What an option is, and its values"""
+"""Description of an option, and its values."""
 ELEMENTS = {"obstacles": (3, 5), "reward_regions": (4,), "drag_regions": (4,)}
-"""Options that are lists of elements of the scene, and how many numbers an element
-has."""
+"""Options that are lists of elements of the scene, and the allowed number of numbers in
+an element."""
 
 
 def checked_options(scenario: Any) -> dict[str, Any]:
@@ -32,7 +32,7 @@ def checked_options(scenario: Any) -> dict[str, Any]:
         scenario: Scenario, a dataclass whose fields are its options.
 
     Raises:
-        ValueError: An option with a value that it cannot have, named.
+        ValueError: An option has a value that is not allowed. The message names it.
     """
     for name, (what, known) in CHOICES.items():
         if getattr(scenario, name) not in known:
@@ -50,7 +50,7 @@ def checked_options(scenario: Any) -> dict[str, Any]:
 
 
 def _elements(name: str, value: Any, sizes: tuple[int, ...]) -> tuple[Any, ...]:
-    """Return the elements of an option as tuples; refuse others than lists of them."""
+    """Return the elements of an option as tuples; raise ValueError for other values."""
     try:
         found = tuple(tuple(float(x) for x in element) for element in value)
     except (TypeError, ValueError):
@@ -58,7 +58,9 @@ def _elements(name: str, value: Any, sizes: tuple[int, ...]) -> tuple[Any, ...]:
     for k, element in enumerate(found):
         if len(element) not in sizes or not np.isfinite(element).all():
             words = " or ".join(map(str, sizes))
-            raise ValueError(f"{name}: {value!r} must be lists of {words} numbers")
+            raise ValueError(
+                f"{name}: {value!r}; expected a list of lists of {words} numbers"
+            )
         if element[2] <= 0:
             raise ValueError(f"{name}: element {k}, {element}: radius must be above 0")
         most = PARAMETERS["puck_damping"].high
@@ -70,10 +72,10 @@ def _elements(name: str, value: Any, sizes: tuple[int, ...]) -> tuple[Any, ...]:
 
 
 def check_places(scenario: Any, table: Table) -> None:
-    """Refuse elements of a scenario that are not on its table.
+    """Check that the elements of a scenario are on its table.
 
     Raises:
-        ValueError: One of them, named.
+        ValueError: An element is not on the table. The message names it.
     """
     half = np.abs(table.vertices).max(0)
     elements = [(n, k, e) for n in ELEMENTS for k, e in enumerate(getattr(scenario, n))]

@@ -1,7 +1,7 @@
 """Scenario contract: scene, initial states, goals, rewards and ends of episodes.
 
-Scenario functions are pure and vectorised: the same code serves one world, 4096 worlds
-and a stored dataset. Leading axes are the caller's.
+The functions of a scenario are pure and vectorised. The same code works for one world,
+4096 worlds and a stored dataset. The leading axes belong to the caller.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ from marl_airhockey.types import Array, Memory
 
 
 class Transition(NamedTuple):
-    """One control step, as the functions of a scenario get it; leading axes (...)."""
+    """One control step, as scenario functions receive it; leading axes (...)."""
 
     before: State
     command: Array
-    """(..., seats, 2) velocity that the limits passed, m/s, table frame"""
+    """Commanded velocities after the limits (..., seats, 2), table frame, m/s."""
     after: State
     memory: Memory
-    """Memory of before the step"""
+    """Memory before the step."""
     new_memory: Memory
-    """Memory of after the step"""
+    """Memory after the step."""
     time_limit_reached: Array
-    """(...) bool: the clock ends the episode with this step"""
+    """True if the time limit ends the episode with this step (...)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario(ABC):
-    """Scenario whose fields are its options.
+    """Scenario, whose fields are its options.
 
-    Memory holds arrays by name, (..., *); `touches` and `apart` (see
-    `touches.count_touches`) are kept for every scenario with pucks.
+    The memory contains arrays (..., *) by name. For every scenario with pucks it
+    contains `touches` and `apart`, see `touches.count_touches`.
     """
 
     seats: str = "robot"
@@ -56,41 +56,41 @@ class Scenario(ABC):
     table: str = "standard"
     """Table preset."""
     goals: str = "flat"
-    """"dict" shows desired and achieved goals separately, as HER needs them."""
+    """"dict" returns desired and achieved goals separately, as HER needs them."""
     rules: str = "own"
-    """"paper" judges by the published code of the paper: `paper_success`."""
+    """"paper" evaluates success by the paper's published code: `paper_success`."""
     obstacles: tuple[tuple[float, ...], ...] = ()
     """Obstacles on the table: discs x, y, radius, or bars x, y, radius, x2, y2 between
     two points (m)."""
     reward_regions: tuple[tuple[float, ...], ...] = ()
-    """Discs x, y, radius (m) and what they pay per second to a seat whose paddle's
-    centre is inside; below 0 for regions to avoid."""
+    """Discs x, y, radius (m) and the reward per second for a seat whose paddle's centre
+    is inside. It is below 0 for regions to avoid."""
     drag_regions: tuple[tuple[float, ...], ...] = ()
-    """Discs x, y, radius (m) and the linear drag (1/s) that is added to the puck's
-    while its centre is inside, from one control step to the next."""
+    """Discs x, y, radius (m) and the linear drag (1/s) that is added for a puck whose
+    centre is inside at the start of a control step."""
     jitter_weight: Weight = 0.01
     """Cost of a squared change of the commanded velocity, in top speeds."""
     turning_weight: Weight = 0.0
     """Cost of a sudden change of direction."""
     reaction: Latency = 0.0
-    """Latency with which seats observe pucks and other paddles, in whole control steps
-    (s), in addition to that of the profile's sensing."""
+    """Latency of pucks and other paddles (s), a multiple of the control step, in
+    addition to the latency of the profile's sensing."""
 
     seconds: Seconds
     """Length of an episode, s."""
 
     announced: ClassVar[tuple[str, ...]] = ()
-    """Names of the arrays of the memory that seats know from the referee, such as a
-    score; under simulated sensing they know all others from what they sense."""
+    """Names of the arrays of the memory that are exact for all seats, such as a score.
+    With simulated sensing, the other arrays are computed from the sensed states."""
     version: ClassVar[int] = 0
-    """Raised whenever the numbers of the scenario change: the v of its gymnasium id."""
+    """Version in the gymnasium id, raised whenever numbers of the scenario change."""
 
     def __post_init__(self) -> None:
         for name, value in checked_options(self).items():
             object.__setattr__(self, name, value)
         check_places(self, self.scene.table)
         if self.obstacles and not self.scene.obstacles:
-            raise ValueError("obstacles: this scenario's own table takes none")
+            raise ValueError("obstacles: not possible on this scenario's own table")
         if self.goals == "dict" and not isinstance(self, GoalScenario):
             raise ValueError('goals="dict": this scenario has no desired goal')
         if self.rules == "paper":
@@ -99,7 +99,7 @@ class Scenario(ABC):
             if self.goals == "dict":
                 raise ValueError('rules="paper": with goals="dict" the goal decides')
         if self.goals == "dict" and self.reaction:
-            raise ValueError('reaction: with goals="dict" seats see goals at once')
+            raise ValueError('reaction: must be 0 with goals="dict"')
 
     @property
     @abstractmethod
@@ -108,13 +108,13 @@ class Scenario(ABC):
 
     @abstractmethod
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        """Sample initial states and memories of ``worlds`` worlds, one row each."""
+        """Sample the initial states and memories of ``worlds`` worlds, one row each."""
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
         """Return the memory of an episode that begins in given states, one row each.
 
-        An episode can begin with any state: of `reset`, of `set_state`, of a recording,
-        of a real table. Scenarios add their own arrays to what this returns.
+        The states come from `reset`, `set_state`, a recording or a real table.
+        Scenarios add their own arrays to the result.
         """
         return no_touches(state) if state.bodies.pucks else {}
 
@@ -127,16 +127,16 @@ class Scenario(ABC):
     ) -> Memory:
         """Return the memory of an episode with goals that depend on its physics.
 
-        Called after `reset` and `initial_memory`; most scenarios keep the default.
-        ``physics`` holds the parameters of the episode by name, (W,) each.
+        It is called after `reset` and `initial_memory`. Most scenarios do not override
+        it. ``physics`` contains the parameters of the episode (W,) by name.
         """
         return memory
 
     def update_memory(self, t: Transition) -> Memory:
         """Return the arrays of the memory that a step changes.
 
-        ``t.memory`` is that before the step, ``t.new_memory`` the same with the new
-        touches. An event that happens once needs a flag of its own, ``old | now``.
+        ``t.memory`` is the memory before the step. ``t.new_memory`` is the same with
+        the new touches. An event that happens once needs its own flag, ``old | now``.
         """
         return {}
 
@@ -147,73 +147,77 @@ class Scenario(ABC):
 
     @abstractmethod
     def reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return named terms, (..., seats) each; the reward is their sum."""
+        """Return the terms (..., seats) by name. The reward is their sum."""
 
     def terminated(self, t: Transition) -> Array:
-        """(...) bool: the episode ended for a reason inside the game."""
+        """(...) bool: the episode ended by the rules of the game."""
         return np.zeros(t.after.time.shape, np.bool_)
 
     def needs_serve(self, t: Transition) -> Array | None:
-        """(...) bool: a puck is to be served after the step; None if never."""
+        """(...) bool: a puck must be served after the step; None if never."""
         return None
 
     def serve(
         self, rng: RandomStreams, state: State, memory: Memory
     ) -> tuple[State, Memory]:
-        """Serve a puck; the rows are those of the worlds that need it.
+        """Serve a puck in the worlds that need it, one row each.
 
-        They are copies, which may be changed and returned.
+        The rows are copies, which may be changed and returned.
         """
         raise NotImplementedError(f"{type(self).__name__} serves no puck")
 
     def eliminated(self, memory: Memory) -> Array | None:
-        """(..., seats) bool: the seat is eliminated; None where none ever is.
+        """(..., seats) bool: the seat is eliminated; None if no seat ever is.
 
-        Their paddles are behind their sides, whose goal lines become walls.
+        The paddle of an eliminated seat is behind its side, whose goal line becomes a
+        wall.
         """
         return None
 
     @abstractmethod
     def success(self, t: Transition) -> Array:
-        """(...) or (..., seats) bool: the success that is reported; latched."""
+        """(...) or (..., seats) bool: success in this step; the episode latches it."""
 
     def paper_success(self, t: Transition) -> Array:
-        """(...) bool: the success of the paper's published code at this step.
+        """(...) bool: success in this step by the paper's published code.
 
-        From github.com/CalCharles/air-hockey-rl, commits aee389d and 747580d, whose x
-        has the opposite sign. With rules="paper" it replaces `success`, also in the
-        rewards, and ends the episode.
+        The code is github.com/CalCharles/air-hockey-rl, commits aee389d and 747580d.
+        Its x has the opposite sign. With rules="paper" this function replaces
+        `success`, also in the rewards, and a success ends the episode.
         """
         raise NotImplementedError(f"{type(self).__name__} is not a task of the paper")
 
     def targets(self, memory: Memory) -> Array | None:
-        """(W, n, 2) points that obstacles must leave free; None if there are none."""
+        """Return points (W, n, 2), m, that obstacles must leave free; None for none."""
         return None
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
-        """Return what to draw for one world, leading axes gone."""
+        """Return the marks to draw for one world, without leading axes."""
         return []
 
     def scores(self, memory: Memory) -> dict[str, Array]:
-        """Return what one world's game counts, by name: by team or seat, or for all."""
+        """Return the counts of one world's game by name, per team, seat or in total."""
         touches = memory.get("touches")
         return {} if touches is None else {"touches": touches.sum()}
 
     def caption(self, memory: Memory) -> str:
-        """Return the score of one world in a few words."""
+        """Return the score of one world as a short text."""
         return ", ".join(
             f"{name} " + " : ".join(f"{count:.0f}" for count in np.ravel(counts))
             for name, counts in self.scores(memory).items()
         )
 
     def decided_by(self, memory: Memory) -> str:
-        """Return by what one world's game is decided; "" if by nothing."""
+        """Return the rule that decides one world's game, for example "goals".
+
+        It is "" if the game is not decided.
+        """
         return ""
 
     @final
     @property
     def name(self) -> str:
-        """Name of the file that the scenario comes from."""
+        """Name of the file that defines the scenario."""
         return type(self).__module__.rpartition(".")[2]
 
     @cached_property
@@ -223,7 +227,7 @@ class Scenario(ABC):
 
     @final
     def furnished(self, table: Table) -> Table:
-        """Return a table with the obstacles on it."""
+        """Return a table with the obstacles of the scenario."""
         posts = [
             Obstacle((x, y), radius, (end[0], end[1]) if end else None)
             for x, y, radius, *end in self.obstacles
@@ -237,7 +241,7 @@ class Scenario(ABC):
 
     @final
     def next_memory(self, t: Transition) -> Memory:
-        """Return the memory after a step: touches, then what the scenario counts."""
+        """Return the memory after a step: touches, then the scenario's own arrays."""
         new = dict(t.memory)
         if t.after.bodies.pucks:
             new.update(count_touches(t.memory, t.before, t.after))
@@ -246,14 +250,14 @@ class Scenario(ABC):
 
     @final
     def all_reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return all reward terms, with the regularizing ones, (..., seats) each.
+        """Return all reward terms (..., seats), including the regularizing terms.
 
-        goal: 1 while the goal is met, with goals="dict" instead of all others.
+        goal: 1 while the goal is met, with goals="dict" instead of all other terms.
         success: with rules="paper" 3 once, by these rules.
         jitter: ``-jitter_weight`` times the squared change of the commanded velocity,
         in top speeds.
         turning: ``-turning_weight`` times the cost of a sudden change of direction.
-        regions: what the regions pay in which the seat's paddle is.
+        regions: reward of the regions in which the seat's paddle is.
         """
         if self.goals == "dict":
             met = self.goal_met(t.after, t.new_memory)
@@ -273,12 +277,12 @@ class Scenario(ABC):
 
     @final
     def added_drag(self, state: State) -> Array:
-        """(..., pucks) linear drag that regions add, 1/s."""
+        """Return the linear drag (..., pucks) that regions add, 1/s."""
         return _sums(state.puck, self.drag_regions)
 
     @final
     def all_marks(self, state: State, memory: Memory) -> list[Mark]:
-        """Return what to draw for one world: `marks`, and the regions."""
+        """Return the marks to draw for one world: `marks` and the regions."""
         paid = self.reward_regions
         means: list[Meaning] = ["reward" if r[3] > 0.0 else "cost" for r in paid]
         means += ["drag"] * len(self.drag_regions)
@@ -288,11 +292,11 @@ class Scenario(ABC):
 
     @final
     def is_terminated(self, t: Transition) -> Array:
-        """(...) bool: `terminated`; with goals="dict", the goal is met.
+        """(...) bool: the episode ended by `terminated`.
 
-        With rules="paper" a success and a puck lost at home.
-
-        Without serves, a puck that was lifted off the table ends the episode, too.
+        With goals="dict" it ends when the goal is met. With rules="paper" it ends with
+        a success or when a puck crosses a goal line. In a scenario without serves, a
+        puck that was lifted off the table ends it, too.
         """
         if self.goals == "dict":
             ends = self.goal_met(t.after, t.new_memory)
@@ -306,13 +310,17 @@ class Scenario(ABC):
 
     @final
     def is_success(self, t: Transition) -> Array:
-        """(...) or (..., seats) bool: `success`; with goals="dict" the goal is met."""
+        """(...) or (..., seats) bool: success in this step.
+
+        It is `goal_met` with goals="dict", `paper_success` with rules="paper", and
+        `success` otherwise.
+        """
         if self.goals == "dict":
             return self.goal_met(t.after, t.new_memory)
         return self.paper_success(t) if self.rules == "paper" else self.success(t)
 
     def goal_met(self, state: State, memory: Memory) -> Array:
-        """(...) bool: the desired goal is met at a state, by `goal_reward` alone."""
+        """(...) bool: the desired goal is met in a state, by `goal_reward` alone."""
         raise NotImplementedError(f"{type(self).__name__} has no desired goal")
 
     @final
@@ -320,12 +328,12 @@ class Scenario(ABC):
         """Apply `next_memory` along a recording, as if no time limit were reached.
 
         Args:
-            memory: at the start, (...).
-            states: (T + 1, ...) states.
-            command: (T, ..., seats, 2) velocities, m/s.
+            memory: Memory (...) at the start.
+            states: States (T + 1, ...), table frame.
+            command: Commanded velocities (T, ..., seats, 2), table frame, m/s.
 
         Returns:
-            Memories (T + 1, ...), the first being ``memory``.
+            Memories (T + 1, ...). The first one is ``memory``.
         """
         memories = [memory]
         for k in range(len(command)):
@@ -337,7 +345,12 @@ class Scenario(ABC):
 
 
 def _sums(points: Array, regions: tuple[tuple[float, ...], ...]) -> Array:
-    """(..., n) sums of the last numbers of the regions that have points (..., n, 2)."""
+    """Return the sums (..., n) of the values of the regions that contain points.
+
+    Args:
+        points: Points (..., n, 2), table frame, m.
+        regions: Regions x, y, radius, m, and value.
+    """
     total = np.zeros_like(points[..., 0])
     for x, y, radius, value in regions:
         total = total + value * (length(points - np.array([x, y])) < radius)
@@ -345,7 +358,7 @@ def _sums(points: Array, regions: tuple[tuple[float, ...], ...]) -> Array:
 
 
 class GoalScenario(Scenario):
-    """Scenario with a desired goal, which can be relabelled in hindsight."""
+    """Base of scenarios with a desired goal, which hindsight can relabel."""
 
     @property
     @abstractmethod
@@ -354,26 +367,27 @@ class GoalScenario(Scenario):
 
     @abstractmethod
     def achieved(self, state: State, memory: Memory) -> Array:
-        """(..., goal) achieved goal of a state."""
+        """Return the achieved goal (..., goal) of a state."""
 
     @abstractmethod
     def desired(self, memory: Memory) -> Array:
-        """(..., goal) desired goal."""
+        """Return the desired goal (..., goal)."""
 
     @abstractmethod
     def goal_reward(self, achieved: Array, desired: Array) -> Array:
-        """(...) 1 where the goal is met, else 0; a function of goals alone."""
+        """Return 1 where the goal is met, else 0 (...). It depends on goals alone."""
 
     def targets(self, memory: Memory) -> Array | None:
         return self.desired(memory)[..., None, :2]
 
     def shown_reward(self, achieved: Array, desired: Array) -> Array:
-        """(...) `goal_reward` of goals from observations, in double precision."""
+        """Return `goal_reward` (...) of observed goals, in double precision."""
         goals = (np.asarray(goal, np.float64) for goal in (achieved, desired))
         return self.goal_reward(*goals)
 
     def goal_met(self, state: State, memory: Memory) -> Array:
-        # In the precision of observations, so that `compute_reward` agrees to the bit.
+        # Goals have the precision of observations, so that `compute_reward` returns the
+        # same values.
         goals = self.achieved(state, memory), self.desired(memory)
         shown = [goal.astype(np.float32).astype(np.float64) for goal in goals]
         met: Array = self.goal_reward(*shown) > 0
@@ -381,7 +395,7 @@ class GoalScenario(Scenario):
 
 
 def _jitter(before: State, command: Array, top_speed: Array | float) -> Array:
-    """(..., seats) squared change of the commanded velocity, in top speeds."""
+    """Return the squared change (..., seats) of the command, in top speeds."""
     change = (command - before.paddle_velocity) / top_speed
     x, y = change[..., 0], change[..., 1]
     squared: Array = x * x + y * y
@@ -389,7 +403,7 @@ def _jitter(before: State, command: Array, top_speed: Array | float) -> Array:
 
 
 def _turning(before: State, command: Array) -> Array:
-    """(..., seats) sudden change of direction: 0 straight on, 1 for a reversal."""
+    """Return the change of direction (..., seats): 0 for none, 1 for a reversal."""
     old = before.paddle_velocity
     size = length(old) * length(command)
     along = (old * command).sum(-1)

@@ -1,7 +1,7 @@
-"""Units of the numbers among a scenario's options, each with its largest value.
+"""Units of the numeric options of scenarios, with the largest value of each.
 
-A field of a scenario is declared with one of them, ``radius: Metres = 0.04``. A plain
-``float`` has no largest value.
+A field of a scenario is declared with one of them, for example
+``radius: Metres = 0.04``. A plain ``float`` has no largest value.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Unit(NamedTuple):
     """Unit of an option."""
 
     most: float
-    """Largest value"""
+    """Largest value."""
     symbol: str = ""
     least: float = 0.0
 
@@ -42,19 +42,20 @@ UNITS = {
     "float": Unit(math.inf),
     "int": Unit(1000.0, "", 1.0),
 }
-"""Units by the name of the type that a field is declared with"""
+"""Units by the name of the declared type of a field."""
 
 
 def check_number(name: str, kind: object, value: object) -> None:
-    """Refuse a value of a numeric option that is no usable number.
+    """Check the value of a numeric option.
 
     Args:
         name: Name of the option.
-        kind: Type that it is declared with, as it is written; others than `UNITS` pass.
-        value: Value.
+        kind: Declared type of the option, as text. Only types in `UNITS` are checked.
+        value: Value of the option.
 
     Raises:
-        ValueError: It is no number, a range, or outside the bounds of its unit.
+        ValueError: The value is not a number, is a range, or is outside the bounds of
+            its unit.
     """
     if kind not in UNITS:
         return
@@ -73,7 +74,7 @@ def check_number(name: str, kind: object, value: object) -> None:
 
 
 def range_of(kind: str) -> str:
-    """Return the values that an option may have, as text; "" if it is no number."""
+    """Return the allowed values of an option as text; "" if it is not a number."""
     if kind not in UNITS:
         return ""
     unit = UNITS[kind]

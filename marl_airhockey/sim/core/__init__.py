@@ -1,1 +1,1 @@
-"""Nouns: table, seats, scene, state, physics, random numbers, limits."""
+"""Basic types: table, seats, scene, state, physics, random numbers and limits."""

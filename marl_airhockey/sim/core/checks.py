@@ -1,8 +1,8 @@
 """Checks of dataclasses: types, finite numbers and ranges of their fields.
 
-A dataclass calls `check_fields` in ``__post_init__``; `build` makes one of a JSON
-object. Both raise a ValueError that names the field, what was given and what was
-expected.
+A dataclass calls `check_fields` in ``__post_init__``. `build` creates a dataclass from
+a JSON object. Both raise a ValueError that names the field, the given value and the
+expected value.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ def check_count(name: str, value: Any, why: str = "") -> int:
     """Return a count as a plain int.
 
     Args:
-        name: Name of what is counted, for the message.
-        value: Count.
+        name: Name of the counted quantity, for the message.
+        value: Count to check.
         why: Reason for the rule, for the message.
 
     Raises:
-        ValueError: It is not a whole number of at least 1.
+        ValueError: The value is not a whole number of at least 1.
     """
     if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
         raise ValueError(f"{name}: {value!r} must be a whole number above 0{why}")
@@ -43,10 +43,10 @@ def check_count(name: str, value: Any, why: str = "") -> int:
 
 
 def check_seed(seed: Any) -> int:
-    """Return a seed of the first of several episodes as a plain int.
+    """Return the seed of the first of several episodes as a plain int.
 
     Raises:
-        ValueError: It is not a whole number of at least 0.
+        ValueError: The seed is not a whole number of at least 0.
     """
     if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:
         raise ValueError(f"seed: {seed!r} must be a whole number of at least 0")
@@ -58,10 +58,10 @@ def check_fields(made: Any, **ranges: Range) -> None:
 
     Args:
         made: Instance of the dataclass.
-        ranges: Least and largest value of the numbers in a field, by its name.
+        ranges: Smallest and largest value of the numbers in a field, by field name.
 
     Raises:
-        ValueError: A field has another type, a number in it is not finite, or it is
+        ValueError: A field has another type, or a number in it is not finite or is
             outside its range.
     """
     for name, hint in _hints(type(made)).items():
@@ -120,8 +120,8 @@ def build(kind: type[T], given: Any, where: str = "") -> T:
     """Return a dataclass with the fields of a JSON object.
 
     Args:
-        kind: Dataclass, which may hold other ones.
-        given: JSON object, as `dataclasses.asdict` makes it.
+        kind: Dataclass, whose fields may be dataclasses.
+        given: JSON object in the form that `dataclasses.asdict` returns.
         where: Name of the object, for messages.
 
     Raises:
@@ -150,7 +150,7 @@ def build(kind: type[T], given: Any, where: str = "") -> T:
 
 
 def _value(given: Any, hint: Any, where: str) -> Any:
-    """Return a value of JSON as its type: lists as tuples, objects as dataclasses."""
+    """Convert a JSON value to its type: lists to tuples, objects to dataclasses."""
     inner = get_args(hint)
     if get_origin(hint) in (Union, types.UnionType):
         hint = next(kind for kind in inner if kind is not type(None))

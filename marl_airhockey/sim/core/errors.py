@@ -1,4 +1,4 @@
-"""Errors: messages about missing packages and unknown names."""
+"""Error messages about missing packages and unknown names."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import importlib.util
 from collections.abc import Iterable
 
 MOST = 8
-"""Largest number of known names that a message lists"""
+"""Largest number of known names that a message lists."""
 LIKE = 0.7
-"""Likeness from which one name is nearly another"""
+"""Similarity from which a name counts as a misspelling of another one."""
 
 
 class UnknownKeywordError(TypeError, ValueError):
-    """Unknown keyword: a TypeError, as in Python, and a ValueError, as bad input is."""
+    """Error for an unknown keyword: a TypeError, as in Python, and a ValueError."""
 
 
 def unknown_keyword(name: str, known: Iterable[object]) -> str:
-    """Return an error message, which holds the words that Python itself uses."""
+    """Return an error message that contains Python's own wording."""
     rest = unknown_name("keyword", name, known)
     return f"unexpected keyword argument {name!r}: {rest}"
 
@@ -26,7 +26,8 @@ def require(module: str, extra: str) -> None:
     """Check that a module of an optional extra is installed.
 
     Raises:
-        RuntimeError: it is not; the message holds the command that installs it.
+        RuntimeError: The module is not installed. The message contains the command
+            that installs it.
     """
     if importlib.util.find_spec(module) is None:
         raise RuntimeError(
@@ -35,9 +36,10 @@ def require(module: str, extra: str) -> None:
 
 
 def unknown_name(what: str, name: object, known: Iterable[object]) -> str:
-    """Return an error message: the unknown name and those that were meant.
+    """Return an error message with an unknown name and the known names.
 
-    Of many known names it holds the one that is nearly the same, or the closest ones.
+    Of more than `MOST` known names, the message contains the one that the user probably
+    meant, or else the most similar ones.
     """
     names = [str(n) for n in known]
     ratio = {n: difflib.SequenceMatcher(None, str(name), n).ratio() for n in names}

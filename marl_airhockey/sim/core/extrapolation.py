@@ -1,4 +1,4 @@
-"""Extrapolation: where pucks are after a short free flight, walls included."""
+"""Extrapolation of pucks over a short free flight, including wall bounces."""
 
 from __future__ import annotations
 
@@ -12,27 +12,28 @@ from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.types import Array
 
 LEGS = 4
-"""Most straight legs of a flight; it ends at the wall that would begin another."""
+"""Largest number of straight legs of a flight. It ends at the wall where one more leg
+would begin."""
 
 
 @dataclass(frozen=True)
 class Walls:
-    """Walls of a table for the centres of its pucks, goals closed.
+    """Walls of a table as limits for the centres of its pucks, with closed goals.
 
-    Pucks bounce as one without spin does at 1 m/s, with the middle parameters of the
-    scene.
+    Bounces are those of a puck without spin at 1 m/s, with the default parameters of
+    the scene.
     """
 
     normals: Array
-    """Inward unit normals (sides, 2)"""
+    """Inward unit normals (sides, 2)."""
     offsets: Array
-    """Distances from the origin (sides,), m"""
+    """Distances from the origin (sides,), m."""
     restitution: float
     friction: float
 
     @staticmethod
     def of(scene: Scene) -> Walls:
-        """Return the walls of a scene, table frame."""
+        """Return the walls of a scene in the table frame."""
         names = "wall_restitution", "wall_friction"
         usual = {name: PARAMETERS[name].default for name in names}
         wall = [scene.defaults.get(name, usual[name]) for name in names]
@@ -48,13 +49,13 @@ class Walls:
 def extrapolate(
     position: Array, velocity: Array, time: float, walls: Walls
 ) -> tuple[Array, Array]:
-    """Predict pucks after a time, with walls, without paddles, air drag and spin.
+    """Predict pucks with walls, but without paddles, air drag and spin.
 
     Args:
-        position: (..., 2) m.
-        velocity: (..., 2) m/s.
-        time: s.
-        walls: in the frame of the pucks.
+        position: Positions (..., 2), m.
+        velocity: Velocities (..., 2), m/s.
+        time: Time of the prediction, s.
+        walls: Walls in the frame of the pucks.
 
     Returns:
         Positions and velocities (..., 2), m and m/s.
@@ -74,7 +75,8 @@ def extrapolate(
         closing, slip = -(vx * nx + vy * ny), vy * nx - vx * ny
         push = (1.0 + walls.restitution) * closing
         grip = walls.friction * push
-        # A third of the slip ends the slip of a disc that can spin, see `laws.impulse`.
+        # An impulse of a third of the slip ends the slip of a disc that can spin, see
+        # `laws.impulse`.
         drag = np.minimum(np.maximum(-slip / 3.0, -grip), grip)
         vx, vy = vx + push * nx - drag * ny, vy + push * ny + drag * nx
     return np.stack([x, y], -1), np.stack([vx, vy], -1)
@@ -83,9 +85,9 @@ def extrapolate(
 def extrapolate_rows(
     position: Array, velocity: Array, time: float, walls: Walls
 ) -> tuple[Array, Array]:
-    """Do what `extrapolate` does in compiled code, for (W, pucks, 2) of float64.
+    """Run `extrapolate` as compiled code for float64 arrays (W, pucks, 2).
 
-    Scripted players predict at every step: numpy's calls for so few rows would be most
+    Scripted drivers predict in every step. For so few rows, numpy calls would be most
     of the cost of a league.
     """
     position_after, velocity_after = np.empty(position.shape), np.empty(velocity.shape)

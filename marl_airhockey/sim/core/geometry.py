@@ -15,7 +15,7 @@ def clip(polygon: Array, normal: Array, offset: float) -> Array:
     """Cut a convex polygon (n, 2) to its part where normal . point + offset >= 0.
 
     Raises:
-        ValueError: nothing of it is left.
+        ValueError: Nothing of the polygon is left.
     """
     distance = polygon @ normal + offset
     kept: list[Array] = []
@@ -43,7 +43,7 @@ def half_planes(polygon: tuple[tuple[float, float], ...]) -> tuple[Array, Array]
         ``normals @ point + offsets >= 0``.
 
     Raises:
-        ValueError: a polygon that is not convex and counter-clockwise.
+        ValueError: The polygon is not convex and counter-clockwise.
     """
     corners = np.asarray(polygon, dtype=float)
     ahead = np.roll(corners, -1, axis=0) - corners

@@ -1,7 +1,7 @@
-"""Laws of pucks and blocks: flight, sliding, restitution and the impulse of a contact.
+"""Physics model of pucks and blocks: flight, sliding, restitution, contact impulse.
 
-They are compiled functions of numbers, the same for every backend and for roll-outs.
-Where they come from: two real tables, see the documentation of the physics.
+The functions are compiled and take plain numbers. All backends and predictions share
+them. They were derived from measurements on two real tables, see docs/physics.md.
 """
 
 from __future__ import annotations
@@ -13,28 +13,29 @@ from marl_airhockey.sim.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 Motion = tuple[float, float, float, float]
-"""Distance along x and y, m, and velocity after it, m/s."""
+"""Displacement along x and y, m, and final velocity along x and y, m/s."""
 
 
 @compiled(nogil=True, error_model="numpy", forceinline=True)
 def fly(
     vx: float, vy: float, h: float, gx: float, gy: float, damping: float, drag: float
 ) -> Motion:
-    """Return the motion of a puck in h s at v' = g - (damping + drag |v|) v.
+    """Return the displacement and final velocity of a puck after h seconds.
 
-    It is a flow: half of the slope's acceleration, the exact solution under drag, the
-    other half. Under drag alone v falls to v / (1 + z) after ln(1 + z) / drag, where z
-    is the drag times the distance without it. With a slope the error is of third order
-    in h: 0.15 mm in 2 s of steps of 50 ms.
+    The equation is v' = g - (damping + drag |v|) v. The solution applies half of the
+    slope's acceleration, then the exact solution under drag, then the other half. Under
+    drag alone, v falls to v / (1 + z) over the distance ln(1 + z) / drag. Here z is the
+    drag times the distance without drag. With a slope the error is of third order in h:
+    0.15 mm in 2 s of steps of 50 ms.
 
     Args:
-        vx: m/s.
-        vy: m/s.
-        h: s.
-        gx: acceleration by the slope, m/s2.
-        gy: the same along y.
-        damping: linear drag, 1/s.
-        drag: quadratic drag, 1/m.
+        vx: Velocity along x, m/s.
+        vy: Velocity along y, m/s.
+        h: Time of the flight, s.
+        gx: Acceleration by the slope along x, m/s2.
+        gy: Acceleration by the slope along y, m/s2.
+        damping: Linear drag, 1/s.
+        drag: Quadratic drag, 1/m.
     """
     time = -np.expm1(-damping * h) / damping if damping > 0.0 else h
     return fly_slowed(vx, vy, h, time, gx, gy, damping, drag)
@@ -51,13 +52,13 @@ def fly_slowed(
     damping: float,
     drag: float,
 ) -> Motion:
-    """Return what `fly` does, given (1 - exp(-damping h)) / damping as ``time``, s."""
+    """Return the result of `fly` for ``time`` = (1 - exp(-damping h)) / damping, s."""
     ux, uy = vx + 0.5 * gx * h, vy + 0.5 * gy * h
     left, way = 1.0, h
     if drag > 0.0 or damping > 0.0:
         z = drag * time * np.sqrt(ux * ux + uy * uy)
         if z < 0.02:
-            # ln(1 + z) / z by its series, which is as exact and faster.
+            # The series of ln(1 + z) / z is as exact and faster.
             way = 1 - z * (0.5 - z * (1 / 3 - z * (0.25 - z * (0.2 - z / 6))))
         else:
             way = np.log1p(z) / z
@@ -68,15 +69,17 @@ def fly_slowed(
 
 @compiled(nogil=True, error_model="numpy", forceinline=True)
 def slide(vx: float, vy: float, h: float, gx: float, gy: float, grip: float) -> Motion:
-    """Return the motion of a block in h s, which Coulomb friction stops and holds.
+    """Return the displacement and final velocity of a block after h seconds.
+
+    Coulomb friction stops the block and holds it.
 
     Args:
-        vx: m/s.
-        vy: m/s.
-        h: s.
-        gx: acceleration by the slope, m/s2.
-        gy: the same along y.
-        grip: deceleration by friction, m/s2.
+        vx: Velocity along x, m/s.
+        vy: Velocity along y, m/s.
+        h: Time of the movement, s.
+        gx: Acceleration by the slope along x, m/s2.
+        gy: Acceleration by the slope along y, m/s2.
+        grip: Deceleration by friction, m/s2.
     """
     speed = np.sqrt(vx * vx + vy * vy)
     if speed == 0.0 and gx * gx + gy * gy <= grip * grip:
@@ -90,7 +93,7 @@ def slide(vx: float, vy: float, h: float, gx: float, gy: float, grip: float) -> 
 
 @compiled(nogil=True, error_model="numpy", forceinline=True)
 def cap(vx: float, vy: float) -> float:
-    """Return the share of a puck's velocity that the cap on its speed leaves."""
+    """Return the factor that limits the speed of a puck to `PUCK_SPEED_CAP`."""
     square = vx * vx + vy * vy
     if square <= PUCK_SPEED_CAP * PUCK_SPEED_CAP:
         return 1.0
@@ -99,12 +102,12 @@ def cap(vx: float, vy: float) -> float:
 
 @compiled(nogil=True, error_model="numpy", forceinline=True)
 def wall_restitution(speed: float, at_one: float, slope: float) -> float:
-    """Return the restitution at a wall, at a normal speed in m/s.
+    """Return the restitution at a wall.
 
     Args:
-        speed: m/s.
-        at_one: restitution at 1 m/s.
-        slope: its loss per ln(m/s).
+        speed: Normal speed, m/s.
+        at_one: Restitution at 1 m/s.
+        slope: Loss of restitution per ln(m/s).
     """
     share = at_one - slope * np.log(max(speed, SLOWEST_BOUNCE))
     return float(min(max(share, 0.0), 1.0))
@@ -119,19 +122,19 @@ def impulse(
     normal_mass: float,
     tangential_mass: float,
 ) -> tuple[float, float]:
-    """Return the impulse of a contact along its normal and along its tangent, N s.
+    """Return the normal and tangential impulse of a contact, N s.
 
-    The normal one returns a share of the closing speed. The tangential one ends the
-    slip (sticking) or is friction times the normal one (sliding, Coulomb).
+    The normal impulse returns a share of the closing speed. The tangential impulse ends
+    the slip (sticking), or is friction times the normal impulse (sliding, Coulomb).
 
     Args:
-        speed: closing speed, m/s, above 0.
-        slip: tangential speed of the second body's edge from the first's, m/s.
-        restitution: share of the closing speed that is returned.
-        friction: coefficient.
-        normal_mass: sum of the inverse masses, 1/kg.
-        tangential_mass: the same with the inverse masses of the edges of discs that can
-            spin, r2 / I, which is 2 / m, 1/kg.
+        speed: Closing speed, m/s, above 0.
+        slip: Tangential speed of the second body's edge relative to the first's, m/s.
+        restitution: Share of the closing speed that is returned.
+        friction: Coefficient of friction.
+        normal_mass: Sum of the inverse masses, 1/kg.
+        tangential_mass: Sum of the inverse masses, plus r2 / I, which is 2 / m, of each
+            disc that can spin, 1/kg.
     """
     normal = (1.0 + restitution) * speed / normal_mass
     most = friction * normal
@@ -148,16 +151,16 @@ def bounce(
     restitution: float,
     friction: float,
 ) -> None:
-    """Let a puck bounce off something heavy, in place.
+    """Apply a bounce off a heavy body to a puck, in place.
 
     Args:
-        puck: (5,) x, y, m, vx, vy and speed of the edge by spin, m/s.
-        nx: of the unit normal toward the puck.
-        ny: of the same.
-        closing: speed at which they come together along it, m/s, above 0.
-        along: speed of the other along the normal turned by +90 degrees, m/s.
-        restitution: share of the closing speed that is returned.
-        friction: coefficient.
+        puck: Puck (5,): x, y, m; vx, vy and speed of the edge by spin, m/s.
+        nx: Component x of the unit normal toward the puck.
+        ny: Component y of the unit normal toward the puck.
+        closing: Closing speed along the normal, m/s, above 0.
+        along: Speed of the other body along the normal turned by +90 degrees, m/s.
+        restitution: Share of the closing speed that is returned.
+        friction: Coefficient of friction.
     """
     slip = nx * puck[3] - ny * puck[2] - along - puck[4]
     push, aside = impulse(closing, slip, restitution, friction, 1.0, 3.0)

@@ -1,9 +1,10 @@
-"""Limits: the one filter between the actions of all drivers and the paddles.
+"""Limits: the filter between the actions of all drivers and the paddles.
 
-A commanded velocity is within the top speed, within the acceleration of the one before,
-and, toward an edge of the reach, no higher than a paddle can still brake from in front
-of it, so that no position is ever clipped. An obstacle counts as an edge through its
-nearest point: as it is convex, what stays outside that edge does not meet it.
+A commanded velocity is within the top speed, and its change is within the largest
+acceleration. Toward an edge of the workspace it is at most the speed from which the
+paddle can still brake before the edge. Positions are therefore never clipped. An
+obstacle counts as an edge through its nearest point. Obstacles are convex, so a paddle
+outside that edge does not touch them.
 """
 
 from __future__ import annotations
@@ -18,24 +19,26 @@ from marl_airhockey.sim.jit.pipeline import Fixed, Stage
 from marl_airhockey.types import Array
 
 JERK = 40.0
-"""Jerk limit per acceleration limit (1/s): a full reversal of the acceleration within
-one control step of 50 ms."""
+"""Jerk limit divided by the acceleration limit (1/s): a full reversal of the
+acceleration within one control step of 50 ms."""
 
 
 class Limited(NamedTuple):
-    """Result of the limits: the command, and by how much the action exceeded it."""
+    """Result of the limits: the command, and the excess of the action over each limit.
+
+    The velocity changes linearly during a step.
+    """
 
     velocity: Array
-    """Velocity at the end of the step, which a linear ramp leads to; table frame
-    (B, S, 2), m/s"""
+    """Velocity at the end of the step (B, S, 2), table frame, m/s."""
     acceleration: Array
-    """Acceleration of that ramp (B, S, 2), m/s2"""
+    """Acceleration during the step (B, S, 2), table frame, m/s2."""
     violation: Array
-    """Excess of the action over each limit, 0 within it (B, S, 5): see `VIOLATIONS`"""
+    """Excess of the action over each limit, 0 within it (B, S, 5), see `VIOLATIONS`."""
 
     @staticmethod
     def empty(worlds: int, seats: int) -> Limited:
-        """Return arrays that are zero, for B worlds and S seats."""
+        """Return arrays of zeros for B worlds and S seats."""
         shape = (worlds, seats, 2)
         violation = np.zeros((*shape[:-1], len(VIOLATIONS)))
         return Limited(np.zeros(shape), np.zeros(shape), violation)
@@ -43,8 +46,8 @@ class Limited(NamedTuple):
 
 VIOLATIONS = ("speed", "acceleration", "jerk", "reach", "cost")
 """Columns of `violation`: excess over the limits of speed (m/s), acceleration (m/s2)
-and jerk (m/s3); speed removed toward an edge of the reach (m/s); and the sum of the
-four, each divided by its limit (the reach by the top speed)."""
+and jerk (m/s3); speed removed toward an edge of the workspace (m/s); and the sum of the
+four, each divided by its limit. The removed speed is divided by the top speed."""
 
 
 INFINITE = "action: every element must be finite, got nan or inf"
@@ -60,22 +63,22 @@ def limits_stage(
     dt: float,
     after: Limited,
 ) -> Stage:
-    """Return the stage that limits actions; it stops at one that is not finite.
+    """Return the stage that limits actions. It stops at an action that is not finite.
 
-    All arrays but the actions are in the table frame; the stage reads and writes them
-    in place, so they must outlive it. See `INFINITE` for the error message.
+    All arrays except the actions are in the table frame. The stage reads and writes
+    them in place, so they must outlive it. `INFINITE` is the error message.
 
     Args:
-        action: (B, S, 2) wanted velocity as a fraction of top speed, ego frames.
-        prescribed: (B, S, 4) position and velocity of prescribed paddles, nan for all
-            others; its velocity is passed on as it is.
-        before: position (B, N, 2) m and velocity (B, N, 2) m/s of all bodies, paddles
-            first, whose velocity is the last command; acceleration (B, S, 2) m/s2 of
-            the last step.
-        reach: reaches of the seats.
-        top: top speed (B,), m/s, and largest acceleration (B,), m/s2.
-        dt: length of a control step, s.
-        after: result, filled by the stage.
+        action: Target velocities (B, S, 2), fraction of top speed, ego frames.
+        prescribed: Position and velocity (B, S, 4) of position-driven paddles, m and
+            m/s; nan for all others. The velocity is passed on unchanged.
+        before: Position (B, N, 2), m, and velocity (B, N, 2), m/s, of all bodies,
+            paddles first; acceleration (B, S, 2) in the last step, m/s2. The velocity
+            of a paddle is its last command.
+        reach: Workspaces of the seats.
+        top: Top speed (B,), m/s, and largest acceleration (B,), m/s2.
+        dt: Length of a control step, s.
+        after: Result, which the stage fills.
     """
     shared = (reach.normals, reach.offsets, reach.share, reach.rotation)
     fixed = map(Fixed, (*shared, reach.obstacles))
@@ -103,7 +106,7 @@ def _limit(
     acceleration: Array,
     violation: Array,
 ) -> bool:
-    """Fill the result for each seat of each world; False at an infinite action."""
+    """Fill the result for all seats; return False if an action is not finite."""
     edges, rate = normals.shape[1], 1.0 / dt
     # Normals of the edges that are close, and the highest speed toward each.
     most_edges = edges + len(obstacles)
@@ -116,7 +119,7 @@ def _limit(
         for _ in range(passes):
             for i in range(count):
                 nx, ny = close_x[i], close_y[i]
-                # Without a branch, which would be guessed wrong too often.
+                # No branch, because it would be mispredicted too often.
                 over = max(-(nx * x + ny * y) - fastest[i], 0.0)
                 x, y = x + over * nx, y + over * ny
         return x, y
@@ -141,8 +144,9 @@ def _limit(
             wx, wy = vx + dx * fit, vy + dy * fit
 
             # Highest speed h toward edge k: after this step a full stop must still fit.
-            # This step takes (v + h) dt / 2; the stop h^2 / 2a and, in ramped steps,
-            # up to h dt / 2 more. It never needs more than the planned deceleration.
+            # This step takes (v + h) dt / 2. The stop takes h^2 / 2a and, in ramped
+            # steps, up to h dt / 2 more. It never needs more than the planned
+            # deceleration.
             planned = hardest * share[s]
             inverse = 1.0 / planned
             ample = top * (0.5 * top * inverse + dt)
@@ -165,7 +169,8 @@ def _limit(
             sx, sy = inside(count, wx, wy)
             if count and (sx - vx) ** 2 + (sy - vy) ** 2 > most * most:
                 # Interpolate toward pure braking until the change is allowed. Both ends
-                # lie inside the (convex) bounds of the edges, so all between does.
+                # are inside the bounds of the edges. The bounds are convex, so all
+                # values between them are inside, too.
                 bx, by = inside(count, vx, vy)
                 share_of_way = _within(sx - bx, sy - by, bx - vx, by - vy, most)
                 sx, sy = bx + share_of_way * (sx - bx), by + share_of_way * (sy - by)
@@ -192,12 +197,13 @@ def _limit(
 
 @compiled(error_model="numpy")
 def away(obstacle: Array, x: float, y: float) -> tuple[float, float, float]:
-    """Return the unit vector from an obstacle to a centre, and its room, m.
+    """Return the unit vector from an obstacle to a paddle, and the free distance, m.
 
     Args:
-        obstacle: (5,) both ends and the distance that centres keep, m.
-        x: of the centre, m.
-        y: likewise.
+        obstacle: Both ends of an obstacle, and the distance that the centres of paddles
+            keep from it (5,), table frame, m.
+        x: Position of the paddle's centre along x, table frame, m.
+        y: Position of the paddle's centre along y, table frame, m.
     """
     ax, ay = obstacle[2] - obstacle[0], obstacle[3] - obstacle[1]
     along = (x - obstacle[0]) * ax + (y - obstacle[1]) * ay

@@ -1,6 +1,6 @@
-"""Physics of a world: values and ranges, and their random draws per episode.
+"""Physics of a world: parameters that are fixed or sampled for each episode.
 
-A parameter is a number, or a range ``(low, high)`` drawn for every episode.
+A parameter is a number, or a range ``(low, high)`` that is sampled for each episode.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.types import Array
 
 Given = str | Path | Mapping[str, Any]
-"""Physics as users give it: the name of a preset, a TOML file, or values and ranges by
-name, which change those of a ``preset`` if one is named among them."""
+"""Physics parameters from a user: the name of a preset, a TOML file, or values and
+ranges by name. The key ``preset`` names the preset that they modify."""
 
 
 SIMULATED = (
@@ -33,23 +33,24 @@ SIMULATED = (
     *("calibration_error", "occlusion", "false_detection"),
     *("action_delay", "servo_time", *SCATTER),
 )
-"""Names of what a simulation adds, since a real table has it by itself"""
+"""Names of the parameters that only a simulation needs. A real table has these effects
+anyway."""
 
 
 class Physics:
     """Parameters of an environment: a value or a range for each name.
 
     Args:
-        base: values that replace the defaults (table, seats, scenario).
-        profile: name or file of the ranges that replace these, see
+        base: Values of table, seats and scenario, which replace the defaults.
+        profile: Name or file of a profile, whose ranges replace these values, see
             `profiles.find_profile`.
-        given: the user's physics: a preset, values and ranges, which override both.
-        arms: True if the backend has robot arms, whose parameters exist then.
-        real: True if the table is real: nothing that a simulation adds to a state is
-            drawn, neither delays nor noise nor scatter.
+        given: Preset, values and ranges from the user, which override both.
+        arms: True to include the parameters of robot arms.
+        real: True for a real table, which needs no simulated latency, noise or contact
+            noise.
 
     Raises:
-        ValueError: an unknown name, or a value outside its bounds.
+        ValueError: A name is unknown, or a value is outside its bounds.
     """
 
     def __init__(
@@ -64,7 +65,8 @@ class Physics:
         chosen = load_physics(given) if isinstance(given, (str, Path)) else given or {}
         if not isinstance(chosen, Mapping):
             raise ValueError(
-                f"physics: {given!r} is no preset, TOML file or dict of parameters"
+                f"physics: {given!r}; expected a preset, a TOML file or a dict of "
+                "parameters"
             )
         values = dict(chosen)
         preset = _preset(values.pop("preset", None))
@@ -88,13 +90,13 @@ class Physics:
             )
         fixed = preset.keys() | values.keys()
         self._sloping = [n for n in ("tilt", "cross_tilt") if n not in fixed]
-        """Tilts that a slope in any direction adds to: those that nobody has given"""
+        """Tilts that the user has not set, to which a random slope is added."""
         for name, value in values.items():
             pair = parameter_range(name, value, f"physics[{name!r}]")
             if name not in self.ranges:
                 raise ValueError(
-                    f"physics[{name!r}] is of arms, and this backend has none: "
-                    "leave it out, or take backend='robosuite'"
+                    f"physics[{name!r}] needs a robot arm, which this backend lacks: "
+                    "omit it, or use backend='robosuite'"
                 )
             self.ranges[name] = pair
             self._follows.pop(name, None)
@@ -102,10 +104,10 @@ class Physics:
             self.ranges.update(dict.fromkeys(SIMULATED, (0.0, 0.0)))
 
     def draw(self, rng: RandomStreams) -> dict[str, Array]:
-        """Draw one value of every parameter for each of W worlds: name -> (W,)."""
+        """Sample every parameter for each of W worlds; return arrays (W,) by name."""
         values: dict[str, Array] = {}
         drawn = [n for n, (a, b) in self.ranges.items() if n in self._follows or a != b]
-        # All in one call, which for one world costs as much as a single one.
+        # One call samples all parameters. For one world it costs as much as one value.
         units = dict(zip(drawn, rng.uniform(0.0, 1.0, len(drawn)).T, strict=True))
         for name, (low, high) in self.ranges.items():
             if name in self._follows:
@@ -121,9 +123,9 @@ class Physics:
         return values
 
     def highest(self, name: str) -> float:
-        """Return the largest value that a parameter is drawn from here.
+        """Return the upper end of the range of a parameter.
 
-        The slope in any direction is added to the tilts besides.
+        For the tilts, it does not include the random slope.
         """
         return self.ranges[name][1]
 
@@ -133,7 +135,7 @@ class Physics:
 
     @property
     def varies(self) -> bool:
-        """True if any parameter is drawn per episode."""
+        """True if any parameter is sampled for each episode."""
         ranges = self.ranges.values()
         return self.any_of("slope") or any(low != high for low, high in ranges)
 
@@ -147,12 +149,13 @@ def _preset(name: object) -> dict[str, float]:
 
 
 def load_physics(source: str | Path) -> dict[str, Any]:
-    """Return physics by the name of a preset, or from a TOML file of parameters.
+    """Return the physics of a preset, or of a TOML file of parameters.
 
-    In a file a parameter is a number or a pair; ``preset`` may name what they change.
+    In a file a parameter is a number or a pair (low, high). The key ``preset`` names
+    the preset that they modify.
 
     Raises:
-        ValueError: neither a preset nor a file that can be read.
+        ValueError: The source is neither a preset nor a readable file.
     """
     if str(source) in PRESETS:
         return {"preset": str(source)}
@@ -161,9 +164,9 @@ def load_physics(source: str | Path) -> dict[str, Any]:
     except (OSError, tomllib.TOMLDecodeError) as error:
         names = ", ".join(PRESETS)
         raise ValueError(
-            f"physics {str(source)!r}: no preset ({names}) and no TOML file of "
+            f"physics {str(source)!r} is no preset ({names}) and no TOML file of "
             f"parameters: {error}"
         ) from error
     if not found:
-        raise ValueError(f"physics {source}: there are no parameters in the file")
+        raise ValueError(f"physics {source}: the file contains no parameters")
     return found

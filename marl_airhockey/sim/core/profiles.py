@@ -1,8 +1,8 @@
-"""Profiles: what a kind of robot senses and how far its physics may lie from ours.
+"""Profiles: sensing and actuation of a kind of robot, and variation of the physics.
 
-Every number has a source: two real tables, measured over 37 minutes of play (see the
-documentation's page on physics), the gantry that played there, and a UR5e with a
-60 frames/s camera. Profiles change sensing, lag and the spread of physics, not seats.
+Every number has a source: two real tables that were measured over 37 minutes of play
+(see docs/physics.md), the gantry that played there, and a UR5e with a camera of
+60 frames/s. Profiles change sensing, lag and the variation of physics, but not seats.
 """
 
 from __future__ import annotations
@@ -22,45 +22,45 @@ from marl_airhockey.types import Array
 
 Range = tuple[float, float]
 SUFFIX = ".toml"
-"""Ending of the names of files of profiles"""
+"""Suffix of profile files."""
 
 
 @dataclass(frozen=True)
 class CorrelatedParameter:
-    """Parameter whose value follows another's along a line, within a spread."""
+    """Parameter that depends linearly on another parameter, within a spread."""
 
     other: str
-    """Name of a parameter that comes before it"""
+    """Name of the other parameter, which precedes this one in `PARAMETERS`."""
     at: tuple[float, float]
-    """Two values of the other"""
+    """Two values of the other parameter."""
     values: tuple[float, float]
-    """Its own values there; constant beyond them"""
+    """Values of this parameter there; constant beyond them."""
     spread: float
-    """Half-width of the range about the line"""
+    """Half-width of the range around the line."""
 
     def at_value(self, other: Array, unit: Array) -> Array:
-        """Return values (W,) for those of the other, given numbers in [0, 1)."""
+        """Return values (W,), given the other parameter and numbers in [0, 1)."""
         line = np.interp(other, self.at, self.values)
         return np.asarray(line + self.spread * (2.0 * unit - 1.0))
 
     @property
     def range(self) -> Range:
-        """Lowest and highest value."""
+        """Lowest and highest value of this parameter."""
         return min(self.values) - self.spread, max(self.values) + self.spread
 
 
 @dataclass(frozen=True)
 class Profile:
-    """Ranges from which the parameters of an episode are drawn, by name."""
+    """Ranges from which the parameters of an episode are sampled, by name."""
 
     what: str
-    """The profile in a few words"""
+    """Short description of the profile."""
     ranges: Mapping[str, Range] = field(default_factory=dict)
-    """Values in the units of the parameters"""
+    """Ranges in the units of the parameters."""
     shares: Mapping[str, Range] = field(default_factory=dict)
-    """Multiples of what scenario and table say"""
+    """Ranges of factors for the values of scenario and table."""
     follows: Mapping[str, CorrelatedParameter] = field(default_factory=dict)
-    """Parameters that are not drawn alone"""
+    """Parameters that depend on another parameter."""
 
 
 UNMEASURED = dict.fromkeys(
@@ -70,14 +70,15 @@ UNMEASURED = dict.fromkeys(
     ),
     (0.85, 1.15),
 )
-"""Multiples of what could not be measured on the tables: within 15 %."""
+"""Factors for parameters that could not be measured on the tables: within 15 %."""
 
 RAILS = CorrelatedParameter("wall_restitution", (0.65, 0.88), (0.08, 0.01), 0.01)
 SLOPES = {"wall_restitution_slope": RAILS}
-"""Lively rails lose little with speed: the wooden table and the professional one."""
+"""Rails with a high restitution lose little of it with speed. The two ends of the line
+are the wooden and the professional table."""
 
 TABLES: dict[str, Range] = {
-    # Both tables lie inside: quadratic drag 0.0205 and 0.0267 1/m, no linear one.
+    # Both tables are inside: quadratic drag 0.0205 and 0.0267 1/m, no linear drag.
     "puck_drag": (0.015, 0.035),
     "puck_damping": (0.0, 0.0),
     # Rails: 0.852 and 0.674 at 1 m/s, friction 0.115 and 0.29.
@@ -86,43 +87,47 @@ TABLES: dict[str, Range] = {
     # Paddles: 0.45 .. 0.50 and 0.59 .. 0.65; their friction is not identifiable.
     "paddle_restitution": (0.44, 0.66),
     "paddle_friction": (0.03, 0.15),
-    # About those laws from bounce to bounce: professional .. wooden.
+    # Contact noise: professional .. wooden.
     "wall_restitution_scatter": (0.013, 0.04),
     "wall_exit_scatter": (0.035, 0.10),
     "paddle_restitution_scatter": (0.05, 0.05),
-    # After a hit the first rail shows 1.2 .. 1.4 m/s at shots of 5.5 .. 7 m/s.
+    # The first bounce after a hit shows an edge speed of 1.2 .. 1.4 m/s at shots of
+    # 5.5 .. 7 m/s.
     "spin_scatter": (0.2, 0.2),
     # 0.04 m/s2: 0.058 along and 0.017 across on the wooden table, 0.007 on the other.
     "slope": (0.234, 0.234),
 }
-"""Laws that span both tables."""
+"""Ranges of parameters that include both tables."""
 
 TILT = {"tilt": (0.733, 1.021)}
-"""Pull of the tilted table: 0.69 .. 0.96 m/s2, as three sources differ, of 0.94."""
+"""Factors of the tilt, which accelerates pucks by 0.94 m/s2 by default. Three sources
+differ and give 0.69 .. 0.96 m/s2."""
 
 CAMERA_60 = {
-    # Exposure, transfer and vision: one or two frames and 3 ms to two dozen more.
+    # Exposure, transfer and vision: one or two frames, and 3 ms to two dozen ms more.
     "observation_delay": (0.025, 0.045),
-    # A frame is up to a period old when it is asked for.
+    # A frame is up to a period old when it is requested.
     "observation_jitter": (0.0167, 0.0167),
-    # 0.4 .. 0.65 mm with printed tags; a map of 1 .. 10 mm from edge to edge.
+    # Noise of 0.4 .. 0.65 mm with printed tags. Calibration errors of 1 .. 10 mm from
+    # edge to edge.
     "position_noise": (0.0004, 0.00065),
     "calibration_error": (0.001, 0.004),
-    # 5 .. 10 % of all frames under the arm; near it, three times as many.
+    # The arm hides the puck in 5 .. 10 % of all frames. Near the arm the share is three
+    # times as high.
     "occlusion": (0.15, 0.30),
-    # Not known for this camera; that of the gantry's.
+    # Unknown for this camera. This is the value of the gantry's camera.
     "false_detection": (0.0003, 0.002),
 }
 
 PROFILES: dict[str, Profile] = {
-    "ideal": Profile("no delay, no noise, the laws as they are given"),
+    "ideal": Profile("no latency, no noise, physics as given"),
     "ur5e": Profile(
-        "a UR5e at 20 Hz under a camera of 60 frames/s, on tables as measured",
+        "UR5e at 20 Hz with a camera of 60 frames/s, on tables as measured",
         {
             **TABLES,
             **CAMERA_60,
-            # Dead time of a command on its way, then a servo that was derived from
-            # 34 ms at a look-ahead of 0.03 s on its relatives: look-aheads 0.05 .. 0.1.
+            # Dead time of a command, then a servo. The servo was derived from 34 ms at
+            # a look-ahead of 0.03 s on related arms, for look-aheads of 0.05 .. 0.1 s.
             "action_delay": (0.004, 0.010),
             "servo_time": (0.050, 0.100),
         },
@@ -130,11 +135,12 @@ PROFILES: dict[str, Profile] = {
         SLOPES,
     ),
     "ur5e-authors": Profile(
-        "the same with the gains and the vision that the paper's authors published",
+        "as ur5e, with the gains and the vision that the paper's authors published",
         {
             **TABLES,
             **CAMERA_60,
-            # 23 .. 70 ms of vision, 4 mm quantised, look-ahead 0.2 s: 250 .. 350 ms.
+            # Vision of 23 .. 70 ms, quantised to 4 mm. With a look-ahead of 0.2 s:
+            # 250 .. 350 ms.
             "observation_delay": (0.045, 0.075),
             "position_noise": (0.0012, 0.0012),
             "calibration_error": (0.001, 0.010),
@@ -145,19 +151,19 @@ PROFILES: dict[str, Profile] = {
         SLOPES,
     ),
     "gantry": Profile(
-        "a core-XY gantry under a camera of 120 frames/s, as measured in play",
+        "core-XY gantry with a camera of 120 frames/s, as measured in play",
         {
             **TABLES,
-            # Round trip by a lamp, 995 trials: 13.4 ms and a camera's period.
+            # Round trip with a lamp, 995 trials: 13.4 ms and a period of the camera.
             "observation_delay": (0.0134, 0.0134),
             "observation_jitter": (0.0083, 0.0083),
-            # 0.05 .. 0.16 mm in flight, a map of 1.0 .. 1.2 mm.
+            # Noise of 0.05 .. 0.16 mm in flight, calibration errors of 1.0 .. 1.2 mm.
             "position_noise": (0.00005, 0.00016),
             "calibration_error": (0.0010, 0.0012),
-            # 0.7 .. 2.2 % of all frames, at the beam and at the far rail.
+            # Hidden in 0.7 .. 2.2 % of all frames, at the beam and at the far rail.
             "occlusion": (0.02, 0.06),
             "false_detection": (0.0003, 0.002),
-            # Lag of the tuned loop behind its plan.
+            # Lag of the tuned controller behind its planned trajectory.
             "servo_time": (0.0, 0.003),
         },
         {**TILT, **UNMEASURED},
@@ -168,13 +174,14 @@ PROFILES: dict[str, Profile] = {
 
 
 def find_profile(name: str) -> Profile:
-    """Return a profile by its name, or that of a TOML file.
+    """Return the profile with a name, or the profile of a TOML file.
 
-    A file has ``base``, the name of a profile, ``what``, and a table ``ranges`` of
-    [low, high] by parameter, which replace those of the base: see `load_profile`.
+    A file has ``base``, the name of a profile, ``what``, a description, and a table
+    ``ranges`` of [low, high] by parameter. They replace the ranges of the base, see
+    `load_profile`.
 
     Raises:
-        ValueError: an unknown name, or a file that makes no sense.
+        ValueError: The name is unknown, or the file is not valid.
     """
     if name in PROFILES:
         return PROFILES[name]
@@ -185,7 +192,7 @@ def find_profile(name: str) -> Profile:
 
 @dataclass(frozen=True)
 class _ProfileFile:
-    """Content of a profile's file."""
+    """Content of a profile file."""
 
     base: str = "ideal"
     what: str = ""
@@ -198,17 +205,18 @@ class _ProfileFile:
 
 
 def load_profile(path: Path) -> Profile:
-    """Read a profile from a TOML file, such as ``airhockey fit-table`` writes.
+    """Read a profile from a TOML file, as ``airhockey fit-table`` writes it.
 
     Raises:
-        ValueError: no such file, an unknown base or parameter, or a range that is none.
+        ValueError: The file does not exist, a base or parameter is unknown, or a range
+            is not valid.
     """
     try:
         given = tomllib.loads(path.read_text())
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"profile {path}: {error}") from error
     if not given:
-        raise ValueError(f"profile {path}: there is nothing in the file")
+        raise ValueError(f"profile {path}: the file is empty")
     try:
         file = build(_ProfileFile, given)
         ranges = {k: parameter_range(k, v, k) for k, v in file.ranges.items()}
@@ -224,15 +232,16 @@ def load_profile(path: Path) -> Profile:
 
 
 RAMP = 0.025
-"""Time in which a seat at its highest acceleration makes half of a velocity change of
-half its top speed, s; robot and arcade seats need 0.1 s to their top speed"""
+"""Time to 50 % of a velocity step of half the top speed at the largest acceleration, s.
+Robot and arcade seats need 0.1 s to reach their top speed."""
 
 
 def delay_of(profile: Profile) -> Range:
-    """Return the least and the longest time from an event to half of the answer, s.
+    """Return the shortest and the longest end-to-end latency, s.
 
-    It is the sum of the age of the frame, the dead time of the command, the servo and
-    `RAMP`. `scripts/reproduce/answer_times.py` measures it.
+    It is the time from an event to 50 % of a velocity step of the paddle: the sum of
+    observation latency, action latency, servo time and `RAMP`.
+    `scripts/reproduce/answer_times.py` measures it.
     """
     names = "observation_delay", "action_delay", "servo_time"
     ends = [profile.ranges.get(name, (0.0, 0.0)) for name in names]

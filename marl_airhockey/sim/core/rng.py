@@ -1,8 +1,8 @@
 """Random numbers: one stream per world, independent of the number of worlds.
 
-A stream is a counter hashed with splitmix64 (Steele, Lea and Flood, "Fast splittable
-pseudorandom number generators", 2014), so that a batch draws in one vector operation
-and row i of 4096 worlds equals a single world with seed + i.
+A stream is a counter that is hashed with splitmix64 (Steele, Lea and Flood, "Fast
+splittable pseudorandom number generators", 2014). A batch is therefore sampled in one
+vector operation, and row i of 4096 worlds equals a single world with seed + i.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def _unit(keys: Array, counts: Array, rows: Array, out: Array) -> None:
 
 @inner(error_model="numpy")
 def normal_pair(first: float, second: float) -> tuple[float, float]:
-    """Return two standard normal numbers of two uniform ones (Box and Muller)."""
+    """Return two standard normal numbers, given two uniform ones (Box and Muller)."""
     radius, phase = math.sqrt(-2.0 * math.log1p(-first)), 2.0 * math.pi * second
     return radius * math.cos(phase), radius * math.sin(phase)
 
@@ -68,22 +68,24 @@ def _is_seed(value: Any) -> bool:
 
 
 def seeds_of(seed: int | Sequence[int], worlds: int) -> Array:
-    """Return the seeds (worlds,) uint64 that a caller's seed means.
+    """Return the seeds of all worlds (worlds,), uint64.
 
     Args:
-        seed: World i gets seed + i (modulo 2^64), or the i-th of a sequence.
+        seed: Seed of world 0, or a sequence with a seed for each world. World i gets
+            seed + i (modulo 2^64), or element i of the sequence.
         worlds: Number of worlds.
 
     Raises:
-        ValueError: It is no whole number from 0 to 2^64 - 1, nor one for each world.
+        ValueError: The seed is neither a whole number from 0 to 2^64 - 1 nor a sequence
+            with one for each world.
     """
-    # As objects, since a list of large and small numbers would become floats.
+    # Objects, because a list of large and small numbers would become floats.
     given = np.array(seed, object)
     whole = all(_is_seed(x) for x in given.flat)
     if not whole or given.shape not in ((), (worlds,)):
         raise ValueError(
-            f"seed: {seed!r} is no whole number from 0 to 2^64 - 1, nor one for each "
-            f"of {worlds} worlds"
+            f"seed: {seed!r}; expected a whole number from 0 to 2^64 - 1, or one for "
+            f"each of {worlds} worlds"
         )
     if given.ndim:
         return given.astype(np.uint64)
@@ -91,26 +93,26 @@ def seeds_of(seed: int | Sequence[int], worlds: int) -> Array:
 
 
 class RandomStreams:
-    """Random streams of W worlds; every method returns one row per world.
+    """Random streams of W worlds. Every method returns one row per world.
 
-    ``select`` returns the streams of some of the rows, shared, so that a rejection loop
-    advances only the worlds that draw again.
+    ``select`` returns the streams of some rows. They share their state with these
+    streams, so a rejection loop advances only the worlds that sample again.
     """
 
     spread: float = 1.0
-    """Share of every range, about its middle, in which `uniform` draws"""
+    """Share of every range, around its middle, from which `uniform` samples."""
 
     def __init__(self, keys: Array, counts: Array, rows: Array) -> None:
         self._keys, self._counts, self._rows = keys, counts, rows
 
     @classmethod
     def keyed(cls, seeds: Array, episodes: Array, purpose: str) -> RandomStreams:
-        """Return the streams of a `StreamSet` for one purpose, begun.
+        """Return new streams for one purpose, as of a `StreamSet`.
 
         Args:
-            seeds: (W,) integer seeds, one per world.
-            episodes: (W,) integer episode numbers.
-            purpose: use of the numbers.
+            seeds: Seeds (W,) of the worlds, integers.
+            episodes: Numbers (W,) of the episodes, integers.
+            purpose: Purpose of the random numbers.
         """
         streams = StreamSet(len(seeds), purpose)
         streams.renew(np.arange(len(seeds)), seeds, episodes)
@@ -132,7 +134,7 @@ class RandomStreams:
         return unit.reshape(len(unit), *shape)
 
     def uniform(self, low: Array | float, high: Array | float, *shape: int) -> Array:
-        """Draw (W, *shape) numbers uniform in [low, high), narrowed by `spread`."""
+        """Sample (W, *shape) numbers uniform in [low, high), narrowed by `spread`."""
         drawn = self.units(*shape)
         if self.spread != 1.0:
             drawn = 0.5 + self.spread * (drawn - 0.5)
@@ -141,20 +143,20 @@ class RandomStreams:
         return drawn
 
     def normal(self, *shape: int) -> Array:
-        """Draw (W, *shape) standard normal numbers (Box and Muller's transform)."""
+        """Sample (W, *shape) standard normal numbers (Box and Muller's transform)."""
         pair = self.units(2, *shape)
         radius = np.sqrt(-2.0 * np.log1p(-pair[:, 0]))
         return np.asarray(radius * np.cos(2.0 * np.pi * pair[:, 1]))
 
 
 class StreamSet:
-    """Random streams of W worlds for several purposes, none of which tells of another.
+    """Independent random streams of W worlds for several purposes.
 
     They are keyed by the seed of the world, the number of its episode and the purpose.
 
     Args:
-        worlds: W.
-        purposes: names of the uses of the numbers.
+        worlds: Number of worlds, W.
+        purposes: Names of the purposes.
     """
 
     def __init__(self, worlds: int, *purposes: str) -> None:
@@ -165,23 +167,28 @@ class StreamSet:
         self._all = np.arange(worlds)
 
     def renew(self, rows: Array, seeds: Array, episodes: Array) -> None:
-        """Restart the streams of some worlds, by index, for their next episode.
+        """Restart the streams of some worlds for their next episode.
 
         Args:
-            rows: (w,) indices.
-            seeds: (W,) integer seeds, one per world.
-            episodes: (W,) integer episode numbers.
+            rows: Indices (w,) of the worlds.
+            seeds: Seeds (W,) of all worlds, integers.
+            episodes: Numbers (W,) of the episodes of all worlds, integers.
         """
         # One type, so that one compiled function serves all callers.
         seeds = seeds.astype(np.uint64, copy=False)
         _begin(self._keys, self._counts, rows, seeds, episodes, self._salts)
 
     def keys(self, purpose: str) -> Array:
-        """Return the keys (W,) of the streams for a purpose, uint64, not a copy."""
+        """Return a view of the keys (W,), uint64, of the streams for a purpose."""
         return np.asarray(self._keys[self._place[purpose]])
 
     def of(self, purpose: str, rows: Array | None = None) -> RandomStreams:
-        """Return the streams for a purpose, shared, of some worlds; None for all."""
+        """Return the streams for a purpose; they share their state with this set.
+
+        Args:
+            purpose: Name of the purpose.
+            rows: Indices of the worlds; None for all.
+        """
         k = self._place[purpose]
         rows = self._all if rows is None else rows
         return RandomStreams(self._keys[k], self._counts[k], rows)

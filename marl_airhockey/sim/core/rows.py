@@ -1,6 +1,7 @@
-"""Rows: those of some worlds in many arrays at once, by one compiled call.
+"""Copying and clearing of rows in many arrays in one compiled call.
 
-numpy's own index costs as much for a hundred rows as these for a dozen arrays.
+For a hundred rows, NumPy's indexing of one array costs as much as these functions cost
+for a dozen arrays.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from marl_airhockey.types import Array
 
 @compiled()
 def copy_rows(worlds: Array, pairs: tuple[tuple[Array, Array], ...]) -> None:
-    """Copy rows (W, n) into those of some worlds (B, n), one array after the other."""
+    """Copy rows (W, n) into the rows of some worlds (B, n), for pairs (into, rows)."""
     for pair in literal_unroll(pairs):
         into, rows = pair
         for i in range(len(worlds)):

@@ -1,8 +1,8 @@
-"""Scatter: how far one contact of a puck lies from the laws, from a counter alone.
+"""Contact noise: random deviation of a single contact of a puck from the contact model.
 
-What a contact draws follows from the key of its world and the number of the collision,
-so a row of many worlds draws what the single world does. Laws and spread were measured
-on two real tables, see the documentation of the physics.
+The random numbers of a contact depend only on the key of its world and the number of
+the collision. A world of a batch therefore gets the same numbers as a single world. The
+model and the noise were measured on two real tables, see docs/physics.md.
 """
 
 from __future__ import annotations
@@ -14,19 +14,20 @@ from marl_airhockey.sim.core.rng import GOLDEN, mix, normal_pair
 from marl_airhockey.sim.jit.cache import compiled
 
 TAIL, WIDER = 0.05, 5.0
-"""Share of bounces whose exit scatters more, and how much more: one table's records."""
+"""Share of bounces with more noise of the exit speed, and the factor of this noise,
+from the records of one table."""
 _UNIT = 2.0**-53
 _11 = np.uint64(11)
 
 
 @compiled(nogil=True, error_model="numpy")
 def draw(key: np.uint64, number: int, place: int) -> tuple[float, float, float]:
-    """Return two standard normal numbers and one in [0, 1) of a contact.
+    """Return two standard normal numbers and one uniform in [0, 1) for a contact.
 
     Args:
-        key: of the world.
-        number: of the collision.
-        place: tells contacts of one moment from each other.
+        key: Key of the world.
+        number: Number of the collision.
+        place: Index that distinguishes simultaneous contacts.
     """
     first = mix(mix(key + np.uint64(number + 1) * GOLDEN) ^ np.uint64(place))
     second, third = mix(first + GOLDEN), mix(first + GOLDEN + GOLDEN)
@@ -43,14 +44,14 @@ def at_wall(
     sd: float,
     exit_sd: float,
 ) -> tuple[float, float]:
-    """Return restitution and speed along the wall, m/s, that a bounce adds.
+    """Return the restitution of a bounce, and the speed that it adds along the wall.
 
     Args:
-        sample: what `draw` returned.
-        speed: closing speed, m/s; slower bounces than were measured scatter less.
-        e: restitution by the law.
-        sd: of the restitution.
-        exit_sd: of the speed along the wall, m/s.
+        sample: Result of `draw`.
+        speed: Closing speed, m/s. Bounces slower than the measured ones add less speed.
+        e: Restitution by the contact model.
+        sd: Standard deviation of the restitution.
+        exit_sd: Standard deviation of the added speed, m/s.
     """
     wide = WIDER if sample[2] < TAIL else 1.0
     share = min(speed / SLOWEST_BOUNCE, 1.0)
@@ -61,5 +62,5 @@ def at_wall(
 def at_paddle(
     sample: tuple[float, float, float], e: float, sd: float, spin_sd: float
 ) -> tuple[float, float]:
-    """Return restitution, and speed of the edge per speed of the puck after the hit."""
+    """Return the restitution, and the edge speed per speed of the puck after a hit."""
     return min(max(e + sd * sample[0], 0.0), 1.0), spin_sd * sample[1]

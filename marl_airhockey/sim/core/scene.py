@@ -1,4 +1,4 @@
-"""Scene: seats, bodies and goal lines on a table, the static side of a scenario."""
+"""Scene: seats, bodies and goal lines on a table, the static part of a scenario."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class GoalLine:
-    """Goal line in the middle of a side, or (``width`` None) the whole side.
+    """Goal line in the middle of a side, or the whole side if ``width`` is None.
 
-    A puck crosses a goal line when its centre passes the side's line there; it crosses
-    a goal line that is a whole side when it touches that wall.
+    A puck crosses a goal line when its centre passes the line of the side there. It
+    crosses a goal line that is a whole side when it touches that wall.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Scene:
     """Seats, bodies and goal lines of a scenario on its table.
 
     Raises:
-        ValueError: a body that does not fit, naming the field.
+        ValueError: A body does not fit. The message names the field.
     """
 
     table: Table
@@ -68,7 +68,7 @@ class Scene:
                 )
 
     def opening(self, goal_line: GoalLine) -> Array:
-        """Return the ends (2, 2) of a goal line in the order of its side's, m."""
+        """Return the ends (2, 2) of a goal line, ordered as the ends of its side, m."""
         start, end = self.table.ends(goal_line.side)
         if goal_line.width is None:
             return np.array([start, end])
@@ -94,13 +94,13 @@ class Scene:
         return self.table.obstacles
 
     def goal_line(self, name: str) -> int:
-        """Return the index of the goal line with this name."""
+        """Return the index of the goal line with a name."""
         return [m.name for m in self.goal_lines].index(name)
 
     def still_state(self, worlds: int) -> State:
-        """Return rows with movable bodies at rest at the origin and no contact.
+        """Return a state with movable bodies at rest at the origin, without contacts.
 
-        Obstacles are at their positions; arrays are freshly allocated.
+        Obstacles are at their positions. The arrays are freshly allocated.
         """
         bodies, count = self.bodies, len(self.bodies)
         pucks, pairs = (worlds, bodies.pucks), (worlds, bodies.paddles, bodies.pucks)
@@ -127,7 +127,7 @@ class Scene:
 
     @cached_property
     def defaults(self) -> dict[str, float]:
-        """Physical parameters that follow from table, scenario and seats."""
+        """Physical parameters that table, scenario and seats set, by name."""
         seat = self.seats[0]
         motion = {"paddle_speed": seat.speed, "paddle_acceleration": seat.acceleration}
         return {**self.table.physics, **self.physics, **motion}

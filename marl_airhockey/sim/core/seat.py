@@ -1,4 +1,4 @@
-"""Seat: one paddle at a side of the table, its reach and its limits."""
+"""Seat: one paddle at a side of the table, its workspace and its limits."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ SEAT_KINDS: tuple[str, ...] = ("robot", "arcade")
 
 @dataclass(frozen=True)
 class Seat:
-    """Seat of one paddle: its side, the region of its centre, and its speed limits."""
+    """Seat of one paddle: its side, its workspace, and its speed limits."""
 
     side: int
-    """Side of the table that it belongs to."""
+    """Index of the side of the table."""
     reach: tuple[tuple[float, float], ...]
-    """Convex polygon around the paddle's centre; ego frame, counter-clockwise, m."""
+    """Workspace of the paddle's centre: a convex polygon, counter-clockwise, ego frame,
+    m."""
     speed: float
     """Top speed (m/s)."""
     acceleration: float
@@ -34,23 +35,25 @@ def make_seat(
 ) -> Seat:
     """Return a seat of a kind at a side of a table.
 
-    ``robot``: what a UR5e can hold with its base 0.22 m behind its side, the table's
-    `robot_reach`, as far as it lies in the side's territory.
-    ``arcade``: all of the territory, at what an arm of a person or a gantry reaches.
-    Centres keep a paddle's radius inside of it.
+    A ``robot`` seat has the workspace and speed of a UR5e whose base is 0.22 m behind
+    the side. The workspace is the part of the table's `robot_reach` that is inside the
+    territory of the side. The workspace of an ``arcade`` seat is the whole territory,
+    and its speed is that of a person's arm or a gantry. The centre of a paddle stays a
+    paddle radius inside the territory.
 
     Args:
-        kind: "robot" or "arcade".
-        table: table of the seat.
-        side: index of its side.
-        others: sides that other seats own; a territory ends half-way to them.
-        team: the team that the seat plays for.
+        kind: Kind of the seat, "robot" or "arcade".
+        table: Table of the seat.
+        side: Index of the side.
+        others: Indices of the sides with other seats. A territory ends half-way to
+            them.
+        team: Team of the seat.
     """
     if kind not in SEAT_KINDS:
         raise ValueError(f"seats: {kind!r} is unknown; there are {SEAT_KINDS}")
     edge = -float(table.offsets[side])
     ego = table.rotation(side).T
-    # From the own side on, so that the numbers of opposite seats are the same.
+    # The order starts at the own side, so opposite seats have the same numbers.
     count = len(table.vertices)
     order = [(side + k) % count for k in range(count)]
     normals = table.normals @ ego
@@ -76,11 +79,11 @@ def make_seat(
 
 @cache
 def reaches(table: Table, seats: tuple[Seat, ...]) -> tuple[Array, Array]:
-    """Return the edges of the reaches of S seats in the table frame.
+    """Return the edges of the workspaces of S seats in the table frame.
 
     Returns:
-        Inward unit normals (S, K, 2), zero where a seat has fewer edges, and offsets
-        (S, K) in metres, infinite there.
+        Inward unit normals (S, K, 2) and offsets (S, K), m. Where a seat has fewer
+        edges, normals are zero and offsets are infinite.
     """
     planes = [half_planes(seat.reach) for seat in seats]
     edges = max(len(offset) for _, offset in planes)
@@ -93,29 +96,31 @@ def reaches(table: Table, seats: tuple[Seat, ...]) -> tuple[Array, Array]:
 
 
 OBSTACLE_MARGIN = 1e-3
-"""Gap that paddles keep to obstacles; braking in a wedge takes up to half of it (m)."""
+"""Distance that paddles keep from obstacles (m). Braking in a wedge takes up to half of
+it."""
 OBSTACLE_SHARE = 0.5
-"""Share of the acceleration that may be planned against one of edges and obstacles."""
+"""Share of the acceleration that may be planned against one edge or obstacle."""
 
 
 @dataclass(frozen=True)
 class ReachPlanes:
-    """Reaches of S seats as half-planes of the table frame."""
+    """Workspaces of S seats as half-planes in the table frame."""
 
     normals: Array
-    """Inward unit normals (S, K, 2); zero where a seat has fewer edges"""
+    """Inward unit normals (S, K, 2); zero where a seat has fewer edges."""
     offsets: Array
-    """Offsets (S, K), m; infinite where a seat has fewer edges"""
+    """Offsets (S, K), m; infinite where a seat has fewer edges."""
     share: Array
-    """Share of the acceleration that may be planned against one edge (S,), so that
-    braking against both edges of a corner together stays within the limit"""
+    """Share of the acceleration that may be planned against one edge (S,). Braking
+    against both edges of a corner together then stays within the limit."""
     rotation: Array
-    """Rotations from the table frame to each seat's ego frame (S, 2, 2)"""
+    """Rotations from the table frame to each seat's ego frame (S, 2, 2)."""
     obstacles: Array
-    """Obstacles (O, 5): both ends, m, and the distance that centres keep, m"""
+    """Obstacles (O, 5): both ends, and the distance that the centres of paddles keep
+    from them, m."""
     passes: int
-    """Number of projections: more than one if any corner is sharper than 90 degrees, or
-    if there are obstacles"""
+    """Number of projections. It is 1 unless a corner is sharper than 90 degrees or
+    there are obstacles."""
 
     @staticmethod
     def of(table: Table, seats: tuple[Seat, ...]) -> ReachPlanes:

@@ -1,8 +1,8 @@
-"""Servo: paddles follow their commands with the lag of a robot.
+"""Servo: lag of paddles behind their commands, as of a robot.
 
-It is a critically damped second-order lag of the velocity, so that short strokes lose
-some of their top speed and long ones only begin and end later. It stands between the
-limits and the physics.
+The velocity has a critically damped second-order lag. Short strokes therefore lose some
+of their top speed, and long strokes begin and end later. The servo is applied between
+the limits and the physics.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from marl_airhockey.sim.jit.pipeline import Fixed, Stage
 from marl_airhockey.types import Array
 
 HALF = 1.6783469900166605
-"""Time in which such a lag makes half of a step, times its frequency: the root of
+"""Time to 50 % of a step of such a lag, times its frequency: the root of
 (1 + x) exp(-x) = 1/2."""
 
 
@@ -29,20 +29,22 @@ def servo_stage(
     dt: float,
     action: Array,
 ) -> Stage:
-    """Return the stage that lets paddles lag behind their orders.
+    """Return the stage that lets paddles lag behind their commands.
 
     Args:
-        ordered: velocities (B, S, 2) that the limits passed in the step before and in
-            this one, between which the order is a linear ramp, m/s, table frame.
-        velocity: (B, N, 2) m/s of all bodies at the start of the step, paddles first.
-        rate: acceleration of the lag (B, S, 2) at the start and, filled, at the end,
-            m/s2.
-        time: (B,) in which half of a change is made, s; 0 for none.
-        top_speed: (B,) m/s.
-        reach: its rotations lead to ego frames.
-        dt: length of a control step, s.
-        action: (B, S, 2), filled: the velocity at the end as an action, a fraction of
-            top speed in ego frames, so that limits can keep it within the reach.
+        ordered: Commanded velocities (B, S, 2) after the limits, in the last step and
+            in this step, table frame, m/s. The command is a linear ramp between them.
+        velocity: Velocities (B, N, 2) of all bodies at the start of the step, paddles
+            first, table frame, m/s.
+        rate: Accelerations of the lag (B, S, 2) at the start and, filled by the stage,
+            at the end, m/s2.
+        time: Times to 50 % of a velocity step (B,), s; 0 for no lag.
+        top_speed: Top speeds (B,), m/s.
+        reach: Workspaces of the seats, whose rotations to ego frames are used.
+        dt: Length of a control step, s.
+        action: Velocity at the end (B, S, 2), filled by the stage as an action:
+            fraction of top speed, ego frames. The limits can then keep it within the
+            workspace.
     """
     given = (*ordered, velocity, *rate, time, top_speed, Fixed(reach.rotation))
     return Stage(_lag, (*given, dt, action))
@@ -61,7 +63,7 @@ def _lag(
     dt: float,
     action: Array,
 ) -> None:
-    """Fill actions and rates with the answer of the lag."""
+    """Fill actions and rates with the response of the lag."""
     answer = np.empty(2)
     for b in range(len(action)):
         w = HALF / time[b] if time[b] > 0.0 else np.inf
@@ -94,16 +96,17 @@ def follow_ramp(
     left: float,
     dt: float,
 ) -> tuple[float, float]:
-    """Return the exact answer of the lag to a ramp, and its rate, after a time dt.
+    """Return the exact response of the lag to a ramp, and its rate, after a time dt.
 
     Args:
-        before: order at the start.
-        after: order at the end.
-        value: of the lag at the start.
-        rate: of the lag at the start, per s.
-        w: frequency of the lag, `HALF` by its half-rise, 1/s; infinite for no lag.
-        left: exp(-w dt), given because many answers share it.
-        dt: time, s.
+        before: Command at the start.
+        after: Command at the end.
+        value: Value of the lag at the start.
+        rate: Rate of the lag at the start, per s.
+        w: Frequency of the lag, 1/s: `HALF` divided by the time to 50 % of a step.
+            Infinite for no lag.
+        left: Value of exp(-w dt), which many responses share.
+        dt: Duration of the ramp, s.
     """
     slope = (after - before) / dt
     late = 2.0 * slope / w

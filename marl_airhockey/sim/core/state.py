@@ -1,7 +1,7 @@
 """State of B worlds: the output of every backend and the input of every scenario.
 
-Axes are named from the right, ``(..., bodies, 2)``. Axes to the left belong to the
-caller: none, ``(B,)`` worlds, or ``(T, B)`` of a stored dataset.
+Axes are named from the right, ``(..., bodies, 2)``. The axes to the left belong to the
+caller: none, ``(B,)`` for worlds, or ``(T, B)`` for a stored dataset.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Bodies:
-    """Static side of a state: number of bodies of each kind, and their sizes."""
+    """Static part of a state: number of bodies of each kind, and their sizes."""
 
     paddles: int
     pucks: int
@@ -63,7 +63,7 @@ class Bodies:
 
     @property
     def movers(self) -> int:
-        """Number of bodies that can move: all but the obstacles."""
+        """Number of bodies that can move: all except the obstacles."""
         return self.paddles + self.pucks + self.blocks
 
     def __len__(self) -> int:
@@ -79,37 +79,38 @@ class State:
 
     bodies: Bodies
     position: Array
-    """Positions (..., N, 2), m"""
+    """Positions (..., N, 2), m."""
     velocity: Array
-    """Velocities (..., N, 2), m/s"""
+    """Velocities (..., N, 2), m/s."""
     angle: Array
-    """Orientations (..., N), rad"""
+    """Orientations (..., N), rad."""
     spin: Array
-    """Angular velocities (..., N), rad/s"""
+    """Angular velocities (..., N), rad/s."""
     touched: Array
-    """Number of contacts that began in the step (..., paddles, pucks)"""
+    """Number of contacts that began in the step (..., paddles, pucks)."""
     touched_at: Array
-    """Time into the step at which the last of these began, nan without any; below 0 on
-    a real table, where contacts are seen late (..., paddles, pucks), s"""
+    """Time into the step at which the last of these contacts began
+    (..., paddles, pucks), s; nan without a contact. It is below 0 on a real table,
+    where contacts are observed with latency."""
     touching: Array
-    """True if in contact at the end of the step (..., paddles, pucks)"""
+    """True for a contact at the end of the step (..., paddles, pucks)."""
     banked: Array
-    """Number of bounces off each side that began in the step (..., pucks, sides)"""
+    """Number of bounces off each side that began in the step (..., pucks, sides)."""
     crossed: Array
-    """True if the puck passed the goal line, or touched one that is a whole side
-    (..., pucks, goal_lines)"""
+    """True if the puck passed the goal line, or touched a goal line that is a whole
+    side (..., pucks, goal_lines)."""
     crossed_velocity: Array
-    """Velocity of the puck as it crossed (..., pucks, goal_lines, 2), m/s"""
+    """Velocity of the puck when it crossed (..., pucks, goal_lines, 2), m/s."""
     lifted: Array
-    """True if the puck was taken off the table, as a prescribed paddle left it no room
-    (..., pucks)"""
+    """True if the puck was taken off the table because a position-driven paddle left it
+    no space (..., pucks)."""
     visible: Array
-    """True if the sensor detects the puck (..., pucks)"""
+    """True if the sensor detects the puck (..., pucks)."""
     time: Array
-    """Time since the start of the episode (...), s"""
+    """Time since the start of the episode (...), s."""
     path: Array | None = None
     """Columns x, y, vx, vy at every substep (..., K + 1, movers, 4); None unless the
-    scene requires it"""
+    scene requires it."""
 
     @property
     def paddle(self) -> Array:
@@ -149,7 +150,11 @@ class State:
         return self.velocity[..., self.bodies.block, :]
 
     def map(self, change: Callable[[Array], Array]) -> State:
-        """Return the state with ``change``, say indexing, applied to every array."""
+        """Return the state with a function, such as indexing, applied to all arrays.
+
+        Args:
+            change: Function of an array.
+        """
         arrays: dict[str, Any] = {n: change(getattr(self, n)) for n in ARRAYS}
         if self.path is not None:
             arrays["path"] = change(self.path)
@@ -158,7 +163,7 @@ class State:
     def write(self, worlds: Array, rows: State) -> None:
         """Copy the `RESULTS` of ``rows`` (W, ...) into some worlds (W,), by index.
 
-        The path becomes that of bodies that have been there all along.
+        The path becomes that of bodies that were there during the whole step.
         """
         count = len(self.time)
         pairs = [

@@ -1,8 +1,8 @@
 """Table: a convex polygon, its sides and their ego frames.
 
-Table frame: origin at the centroid; for a rectangle x runs along the length from the
-home end (side 0) to the far end, y to the left. The ego frame of a side is the table
-frame rotated so that the side's inward normal is +x.
+The origin of the table frame is the centroid. On a rectangle, x points along the length
+from the home end (side 0) to the far end, and y points to the left. The ego frame of a
+side is the table frame, rotated so that the side's inward normal is +x.
 """
 
 from __future__ import annotations
@@ -24,19 +24,20 @@ BOX = (
     *((0.0782, 0.25), (0.0782, -0.25), (0.4182, -0.25)),
     *((0.4982, -0.15), (0.4982, 0.15), (0.4182, 0.25)),
 )
-"""What an arm needs on the standard table: a box with far corners cut at the slope of
-0.8 that the paper's authors use."""
+"""Workspace of an arm on the standard table: a box whose far corners are cut at a slope
+of 0.8, as by the paper's authors."""
 WIDE = (
     *((0.0782, 0.36), (0.0782, -0.36), (0.42, -0.36), (0.47, -0.25), (0.51, -0.08)),
     *((0.51, 0.08), (0.47, 0.25), (0.42, 0.36)),
 )
-"""All that a UR5e holds with its base 0.22 m behind the side: no joint is faster than
-0.9 pi rad/s at 0.7 m/s in any direction, flat or tilted, by inverse kinematics."""
+"""Whole workspace of a UR5e with its base 0.22 m behind the side. By inverse
+kinematics, no joint is faster than 0.9 pi rad/s at 0.7 m/s in any direction, flat or
+tilted."""
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """Obstacle: a static disc, or a rounded segment if ``end`` is given; metres."""
+    """Static disc, or a rounded segment if ``end`` is given, table frame, m."""
 
     start: tuple[float, float]
     radius: float
@@ -45,24 +46,25 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Table:
-    """Convex playing surface; `TABLES` holds presets.
+    """Convex playing surface. `TABLES` holds presets.
 
     Raises:
-        ValueError: a polygon that is not convex and counter-clockwise about the
-            origin, or a disc that does not fit on it.
+        ValueError: The polygon is not convex and counter-clockwise around the origin,
+            or a disc does not fit on it.
     """
 
     vertices: tuple[tuple[float, float], ...]
     """Corners (m), counter-clockwise; side k runs from corner k to k + 1."""
     paddle_radius: float = 0.047625
-    """Radius of a paddle (m; 3.75 in diameter)."""
+    """Radius of a paddle (m). The diameter is 3.75 inches."""
     puck_radius: float = 0.03175
-    """Radius of a puck (m; 2.5 in diameter)."""
+    """Radius of a puck (m). The diameter is 2.5 inches."""
     robot_reach: tuple[tuple[float, float], ...] = BOX
-    """Convex polygon that a UR5e at a side holds: x from the side, y, m."""
+    """Workspace of a UR5e at a side: a convex polygon of x, measured from the side, and
+    y, m."""
     obstacles: tuple[Obstacle, ...] = ()
     physics: dict[str, float] = field(default_factory=dict, hash=False)
-    """Physical parameters that come with this table, by name."""
+    """Physical parameters that this table sets, by name."""
 
     def __post_init__(self) -> None:
         corners = np.asarray(self.vertices, dtype=float)
@@ -93,7 +95,7 @@ class Table:
         """Return a regular polygon with sides ``inradius`` m from the centre."""
         radius = inradius / np.cos(np.pi / sides)
         angles = np.pi - np.pi / sides + 2 * np.pi * np.arange(sides) / sides
-        # Side 0 faces +x: it lies at x = -inradius, as home does on a rectangle.
+        # Side 0 faces +x and is at x = -inradius, like home on a rectangle.
         corners = radius * np.stack([np.cos(angles), np.sin(angles)], -1)
         return Table(tuple((float(x), float(y)) for x, y in corners))
 
@@ -117,11 +119,12 @@ class Table:
         return np.asarray(np.ptp(np.asarray(self.vertices), axis=0))
 
     def from_standard(self, points: Array) -> Array:
-        """Carry points (..., 2) of the standard table over to this one, m.
+        """Map points (..., 2) of the standard table to this table, m.
 
-        What a UR5e reaches there it reaches here: x is linear from the home side to the
-        near edge of `robot_reach`, to its far edge, and to the far end; y is
-        proportional to its width. On the standard table nothing changes.
+        The workspace of a UR5e is mapped to its workspace here. x is piecewise linear
+        between the home side, the near and the far edge of `robot_reach`, and the far
+        end. y is proportional to the width of `robot_reach`. On the standard table
+        points do not change.
         """
         (x, width), (new_x, new_width) = _knots(TABLES["standard"]), _knots(self)
         if x == new_x and width == new_width:
@@ -141,7 +144,7 @@ class Table:
 
 
 def _knots(table: Table) -> tuple[tuple[float, ...], float]:
-    """Return x of home, of both edges of the reach and of the far end; its width, m."""
+    """Return x of home, both edges of the workspace and the far end; its width, m."""
     home = -float(table.offsets[0])
     along, across = zip(*table.robot_reach, strict=True)
     far = home + float(table.size[0])
@@ -164,6 +167,7 @@ TABLES: dict[str, Table] = {
         robot_reach=WIDE,
     ),
 }
-"""Table presets: the 66 x 24 in workspace and the 76 x 34 in table of the paper, and
-the professional and the home-made wooden table whose play was measured, the last with
-its physics."""
+"""Table presets. ``standard`` and ``full_size`` are the workspace of 66 x 24 in and the
+table of 76 x 34 in of the paper. ``ubc_pro`` and ``ubc_wood`` are the professional and
+the home-made wooden table that were measured in play. ``ubc_wood`` includes its
+physics."""

@@ -1,4 +1,4 @@
-"""Touches: distinct contacts of paddles and pucks, counted in a memory."""
+"""Distinct contacts of paddles and pucks, counted in a memory."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array, Memory
 
 TOUCH_GAP = 0.15
-"""Least time (s) from the end of a contact to a touch that counts as distinct."""
+"""Shortest time (s) from the end of a contact to a touch that counts as distinct."""
 
 
 def no_touches(state: State) -> Memory:
@@ -21,11 +21,12 @@ def no_touches(state: State) -> Memory:
 
 
 def count_touches(memory: Memory, before: State, after: State) -> Memory:
-    """Count distinct touches; return the new memory.
+    """Count distinct touches and return the new memory.
 
-    ``touches`` (..., paddles, pucks) is their number, ``apart`` (..., paddles, pucks)
-    the time since the last contact ended (s, 0 while in contact), ``any_touch`` (...)
-    True after the first touch. A puck cradled against the paddle counts as one touch.
+    ``touches`` (..., paddles, pucks) is their number. ``apart`` (..., paddles, pucks)
+    is the time since the last contact ended, s, and 0 during a contact. ``any_touch``
+    (...) is True after the first touch. A puck that lies on the paddle counts as one
+    touch.
     """
     dt = (after.time - before.time)[..., None, None]
     began = after.touched > 0

@@ -1,1 +1,1 @@
-"""Compiler: numpy functions traced once and compiled over worlds; threads."""
+"""Compiler of NumPy functions into loops over worlds, its cache, and threads."""

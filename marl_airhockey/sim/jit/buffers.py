@@ -1,4 +1,4 @@
-"""Buffers: fresh arrays for the results of calls, allocated for many calls at once."""
+"""Pools of new arrays for the results of calls, allocated for many calls together."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 from marl_airhockey.types import Array
 
 ROWS = 64
-"""Number of rows allocated at once: numpy indexes an array faster than it allocates a
-new one."""
+"""Number of rows that are allocated together. NumPy indexes an array faster than it
+allocates a new one."""
 
 
 class BufferPool:
     """Pool of freshly allocated, uninitialised arrays.
 
     Args:
-        kinds: shape and dtype of a row of each array.
+        kinds: Shape and dtype of a row of each array.
     """
 
     def __init__(self, kinds: Sequence[tuple[tuple[int, ...], Any]]) -> None:

@@ -1,9 +1,10 @@
 """Cache of compiled code: a file for each function, its signature and its processor.
 
-The name of a file holds a hash of all that its code depends on (`fingerprint`), so an
-edit compiles again just what it changes, and no other code is ever loaded for it.
-Neither the location of the package nor modification times matter, so a fresh clone of
-the same sources starts with what an older one compiled.
+The name of a file contains a hash of everything that its code depends on
+(`fingerprint`). After an edit, only the functions that it changes are compiled again,
+and outdated code is never loaded. The location of the package and modification times
+have no influence. A new clone of the same sources uses the code that an older clone
+compiled.
 """
 
 from __future__ import annotations
@@ -34,15 +35,15 @@ from marl_airhockey.sim.jit.shipped import Target, shipped
 F = TypeVar("F", bound=Callable[..., Any])
 
 used: set[Path] = set()
-"""Files of compiled code that this process has loaded or written"""
+"""Files of compiled code that this process has loaded or written."""
 
 
 @contextmanager
 def one_process(name: str) -> Iterator[None]:
-    """Keep other processes and threads out of what has this name.
+    """Exclude other processes and threads from the work with a name.
 
-    Threads are kept out by numba's own lock, as a second one could be taken in another
-    order. Where a lock file cannot be made, no process is kept out.
+    Threads are excluded by numba's own lock, because a second lock could be taken in
+    another order. If a lock file cannot be created, processes are not excluded.
     """
     from filelock import FileLock
 
@@ -54,11 +55,11 @@ def one_process(name: str) -> Iterator[None]:
 
 
 class CodeFiles:
-    """Files of one function, as numba's dispatchers expect a cache.
+    """Files of one function, with the interface of a cache of numba's dispatchers.
 
     Args:
-        function: Function, as it is written.
-        name: Its fingerprint, if that is known.
+        function: Python function.
+        name: Fingerprint of the function; "" to compute it.
     """
 
     def __init__(self, function: Any, name: str = "") -> None:
@@ -68,7 +69,7 @@ class CodeFiles:
         """Return the files that may hold the code of a signature, the best first.
 
         Args:
-            signature: Numba's types of the arguments, or a text that names them.
+            signature: Numba types of the arguments, or a text that names them.
             target: System, processor and features for which this process compiles.
         """
         if not self._name:
@@ -88,16 +89,16 @@ class CodeFiles:
         return paths
 
     def exist(self, signature: Any) -> bool:
-        """Return whether there is code of a signature for this process."""
+        """Return True if there is code of a signature for this process."""
         target = cpu_target.target_context.codegen().magic_tuple()
         return any(path.exists() for path in self.paths(signature, target))
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """Return what was compiled for a signature; None if there is nothing."""
+        """Return the compiled code of a signature; None if there is none."""
         context.refresh()
         for path in self.paths(signature, context.codegen().magic_tuple()):
             try:
-                # Pickles of a folder that this user, or the package, has written.
+                # The pickles were written by this user or belong to the package.
                 found = pickle.loads(path.read_bytes())
                 code = CompileResult._rebuild(context, *found)
             except OSError:
@@ -117,7 +118,7 @@ class CodeFiles:
         return None
 
     def save_overload(self, signature: Any, code: Any) -> None:
-        """Store what was compiled for a signature, if the folder can be written."""
+        """Store the compiled code of a signature if the folder is writable."""
         lifted = any(not loop.can_cache for loop in code.lifted)
         if lifted or code.library.has_dynamic_globals:
             return
@@ -141,10 +142,11 @@ def compiled(
     """Return a decorator that compiles a function by numba and caches its code.
 
     Args:
-        nogil: Whether other threads may run meanwhile.
-        error_model: "python" raises on a division by zero, "numpy" gives inf or nan.
-        forceinline: Whether LLVM inlines every call.
-        name: Fingerprint of the function, if it is known.
+        nogil: True to release the GIL while the function runs.
+        error_model: "python" to raise on a division by zero, "numpy" to return inf or
+            nan.
+        forceinline: True to inline every call in LLVM.
+        name: Fingerprint of the function; "" to compute it.
     """
 
     def decorate(function: F) -> F:
@@ -164,14 +166,14 @@ def inner(
     error_model: Literal["python", "numpy"] = "python",
     forceinline: bool = False,
 ) -> Callable[[F], F]:
-    """Return a decorator for a function that compiled code alone calls.
+    """Return a decorator for a function that only compiled code calls.
 
-    It gets no entry for Python, which saves a tenth of the time to compile the
-    physics, and no file of its own in the cache. Python runs it as it is written.
+    The function has no entry point for Python, which saves a tenth of the time to
+    compile the physics. It has no file in the cache. Python runs it uncompiled.
 
     Args:
-        error_model: see `compiled`.
-        forceinline: see `compiled`.
+        error_model: Error model, see `compiled`.
+        forceinline: True to inline every call, see `compiled`.
     """
 
     def decorate(function: F) -> F:

@@ -1,7 +1,7 @@
 """Code generator: writes a tape as a module with a loop and compiles it with numba.
 
-What numba makes of them is stored in the folder of compiled code (`cache`), so that a
-loop is compiled once per machine.
+The result is stored in the folder of compiled code (`cache`), so a loop is compiled
+once per machine.
 """
 
 from __future__ import annotations
@@ -35,30 +35,30 @@ _loaded: dict[str, Loaded] = {}
 
 
 class Writer:
-    """Writer of a module for a tape: the loop, and its call with mappings.
+    """Writer of a module for a tape: the loop, and a function that calls it.
 
     Args:
-        tape: recorded operations.
-        inputs: arrays (B, *) by name, of which types and shapes are used.
+        tape: Recorded operations.
+        inputs: Arrays (B, *) by name. Only their types and shapes are used.
     """
 
     def __init__(self, tape: Tape, inputs: Mapping[Name, Array]) -> None:
         self._tape, self._arrays = tape, inputs
         self._stores: list[tuple[int, int, Any]] = []
-        """Index of an output, that of an element in its row, and what is stored"""
+        """Index of an output, index of an element in its row, and stored scalar."""
         self._outputs: list[tuple[str, int]] = []
-        """Numba types of the outputs, and the sizes of their rows"""
+        """Numba types of the outputs, and the sizes of their rows."""
         self._sinks: list[list[str]] = []
         self._live: set[Symbol] = set()
         self.inputs: dict[Name, int] = {}
-        """Indices of the used inputs, by name"""
+        """Indices of the used inputs, by name."""
 
     def begin_sink(self) -> None:
         """Start the next mapping of outputs."""
         self._sinks.append([])
 
     def store(self, key: str, place: Array, dtype: Any) -> None:
-        """Write an array of one world, (*) scalars, to a fresh output."""
+        """Store the scalars (*) of one world in a new output."""
         output = len(self._outputs)
         self._outputs.append((_type(dtype, 1 + place.ndim), place.size))
         self._sinks[-1].append(f"{key!r}: o{output}")
@@ -140,19 +140,19 @@ class Loaded(NamedTuple):
     """Generated module, and its compiled function."""
 
     kernel: Callable[..., Any]
-    """Compiled function of the module"""
+    """Compiled function of the module."""
     module: ModuleType
 
 
 def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Loaded:
     """Load a module and compile its ``kernel`` for its ``SIGNATURE`` with numba.
 
-    What is not in the cache is announced on stderr, once for several in a row.
+    A compilation is announced on stderr, once for several compilations in a row.
 
     Args:
-        source: text of the module.
-        name: subject of the announcement.
-        names: further global names of the module.
+        source: Source code of the module.
+        name: Subject of the announcement.
+        names: Additional global names of the module.
     """
     names = names or {}
     called = [fingerprint(function) for function in names.values()]
@@ -182,7 +182,7 @@ def _compiled(module: ModuleType, digest: str, name: str) -> Callable[..., Any]:
     files = CodeFiles(module.kernel, digest)
     with ExitStack() as stack:
         if not files.exist(module.SIGNATURE):
-            # Another process that needs it too waits, and then finds it.
+            # Another process that needs the same code waits here and then finds it.
             with announced_wait(name):
                 stack.enter_context(one_process(module.__name__))
             if not files.exist(module.SIGNATURE):
@@ -194,7 +194,8 @@ def _compiled(module: ModuleType, digest: str, name: str) -> Callable[..., Any]:
 
 
 FEW_FUNCTIONS = 15
-"""Number of functions in the cache below which most of a scenario is not there yet"""
+"""Number of functions in the cache below which most functions of a scenario are
+missing."""
 
 
 def _is_first() -> bool:

@@ -1,10 +1,11 @@
 """Fingerprint of a compiled function: a hash of all that its machine code depends on.
 
-Numba caches a function by the file in which it is written, so it would keep running old
-code of the functions and constants that it takes from other files. A fingerprint
-follows them: the bytecode of the function and of all that it calls, and the values of
-all constants that they read. Comments, docstrings and line numbers are no part of it.
-Python, numba and numpy themselves are not followed: their versions name the folder.
+Numba caches a function by its source file. It would therefore use outdated code of
+functions and constants from other files. A fingerprint includes them: the bytecode of
+the function and of all functions that it calls, and the values of all constants that
+they read. Comments, docstrings and line numbers are not included. The code of Python,
+numba and numpy is not included either. The name of the cache folder contains the
+versions of Python and numba.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.types import Type
 
 LIBRARIES = sys.stdlib_module_names | {"llvmlite", "numba", "numpy"}
-"""Modules whose functions are known by their names"""
+"""Modules whose functions are identified by their names."""
 PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic)
-"""Types of constants that are known by what they print"""
+"""Types of constants that are identified by their `repr`."""
 
 
 @cache
@@ -33,10 +34,10 @@ def fingerprint(function: Callable[..., Any]) -> str:
     """Return the fingerprint of a function, 16 hexadecimal digits.
 
     Args:
-        function: Python function, or what numba made of one.
+        function: Python function, or its numba dispatcher.
 
     Raises:
-        TypeError: It depends on a value of a kind that has no fingerprint.
+        TypeError: The function depends on a value that has no fingerprint.
     """
     walk = _Walk()
     walk.add(function)
@@ -44,19 +45,20 @@ def fingerprint(function: Callable[..., Any]) -> str:
 
 
 class _Walk:
-    """Walk from a function to all that it depends on, each once."""
+    """Walk over everything that a function depends on; visits each object once."""
 
     def __init__(self) -> None:
         self.digest = hashlib.sha256()
         self._known: dict[int, int] = {}
         self._kept: list[Any] = []
-        """What has been added, as an object's id is free when the object is gone"""
+        """Objects that were added. They are stored because Python reuses the id of a
+        deleted object."""
 
     def _note(self, *texts: object) -> None:
         self.digest.update(repr(texts).encode())
 
     def add(self, value: Any) -> None:
-        """Add a value, and what it depends on."""
+        """Add a value and everything that it depends on."""
         if isinstance(value, PLAIN):
             self._note(type(value).__name__, repr(value))
         elif isinstance(value, (tuple, list)):
@@ -107,7 +109,7 @@ class _Walk:
         self._add_names(function.__globals__, names)
 
     def _add_names(self, known: dict[str, Any], names: set[str]) -> None:
-        """Add the values of names in a module, those of imported modules included."""
+        """Add the values of names in a module, including those of imported modules."""
         for name in sorted(names & known.keys()):
             value = known[name]
             self._note("name", name)
@@ -129,7 +131,7 @@ class _Walk:
                     self.add(member)
 
     def _add_code(self, code: CodeType) -> set[str]:
-        """Add bytecode and constants; return the names that it looks up."""
+        """Add bytecode and constants; return the names that the code looks up."""
         self._note(code.co_code, code.co_exceptiontable, code.co_flags, code.co_names)
         self._note(code.co_varnames, code.co_freevars, code.co_cellvars)
         names = set(code.co_names)
@@ -144,7 +146,7 @@ class _Walk:
 
 
 def _has_docstring(code: CodeType) -> bool:
-    """Return whether the first constant is a text that no instruction reads."""
+    """Return True if the first constant is a text that no instruction reads."""
     first = next(iter(code.co_consts), None)
     pairs = zip(code.co_code[::2], code.co_code[1::2], strict=True)
     return isinstance(first, str) and not any(
@@ -153,7 +155,7 @@ def _has_docstring(code: CodeType) -> bool:
 
 
 def _is_of_library(value: Any) -> bool:
-    """Return whether a value is of Python, numpy or numba."""
+    """Return True if a value belongs to Python, numpy or numba."""
     if isinstance(value, (np.ufunc, np.dtype, Type, BuiltinFunctionType)):
         return True
     named = "__name__" if isinstance(value, ModuleType) else "__module__"

@@ -1,4 +1,4 @@
-"""Folders in the user's cache: compiled code, data sets, addresses of what runs."""
+"""Folders of the user's cache: compiled code, datasets, addresses of processes."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ import llvmlite
 import numba
 
 VARIABLE = "MARL_AIRHOCKEY_CACHE"
-"""Environment variable that names the folder of all that the library caches"""
+"""Environment variable that names the cache folder of the library."""
 UNUSED = 30 * 24 * 3600.0
-"""Time after which compiled code that nobody has used is deleted, s"""
+"""Time after which unused compiled code is deleted, s."""
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what compiles: Python, numba and llvmlite."""
+    """Return the versions of Python, numba and llvmlite, which compile the code."""
     python = f"{sys.version_info.major}.{sys.version_info.minor}"
     return {
         "python": python,
@@ -55,12 +55,12 @@ def _candidates() -> Iterator[Path]:
 
 @cache
 def cache_folder() -> Path:
-    """Return the folder of all that the library caches.
+    """Return the cache folder of the library.
 
-    That is MARL_AIRHOCKEY_CACHE, or else ``marl_airhockey`` in the user's cache
-    folder, or in NUMBA_CACHE_DIR if neither can be written. A read-only one is used if
-    it holds compiled code, as in a container. If there is none, a temporary folder
-    serves this process and those that it starts, with a warning.
+    It is MARL_AIRHOCKEY_CACHE, or ``marl_airhockey`` in the user's cache folder, or in
+    NUMBA_CACHE_DIR if neither is writable. A read-only folder is used if it holds
+    compiled code, as in a container. Without such a folder, this process and its child
+    processes use a temporary folder, with a warning.
     """
     tried = []
     for folder in _candidates():
@@ -85,9 +85,9 @@ def _code_name() -> str:
 
 @cache
 def code_folder() -> Path:
-    """Return the folder of the code that these versions of numba compile."""
+    """Return the folder of compiled code for the installed versions."""
     folder = cache_folder() / _code_name()
-    # A read-only cache can be read all the same.
+    # A read-only cache is still readable.
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
     return folder
@@ -97,7 +97,7 @@ def delete_unused() -> None:
     """Delete compiled code that has not been used for `UNUSED`."""
     oldest = time.time() - UNUSED
     for path in cache_folder().glob("code-*/*"):
-        # Another process may delete it, too.
+        # Another process may delete the file at the same time.
         with suppress(OSError):
             if path.stat().st_mtime < oldest:
                 path.unlink()

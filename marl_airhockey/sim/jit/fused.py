@@ -1,10 +1,9 @@
-"""Fused functions: pure numpy functions over worlds, each compiled into one loop.
+"""Fused functions: pure NumPy functions over worlds, each compiled into one loop.
 
-Scenarios and observables are written for arrays (..., *) whose leading axes are the
-caller's. So they can be run once on symbols of a single world (`tracer`), and the
-recorded operations are compiled by numba: no temporaries, and no cost of a numpy call
-per operation. Code that cannot be traced runs in numpy, with a warning that gives the
-reason.
+Scenarios and observables are written for arrays (..., *) with any leading axes. They
+can therefore run once on symbols of a single world (`tracer`), and numba compiles the
+recorded operations. The loop needs no temporary arrays and no NumPy call per operation.
+Code that cannot be traced runs in NumPy, with a warning that gives the reason.
 """
 
 from __future__ import annotations
@@ -25,34 +24,35 @@ from marl_airhockey.sim.jit.tracer import Tape
 from marl_airhockey.types import Array
 
 Source = Mapping[str, Any]
-"""Named arrays (B, *), and other values that are the same in all worlds."""
+"""Named arrays (B, *), and other values that all worlds share."""
 Sink = dict[str, Array]
 """Named arrays (B, *)."""
 Function = Callable[..., tuple[Sink, ...]]
-"""Function from sources to sinks, whose leading axes are the caller's."""
+"""Function from sources to sinks with any leading axes."""
 
 
 class Fused:
-    """Function of named arrays over worlds, compiled for the first arrays it gets.
+    """Function of named arrays over worlds, compiled for the arrays of its first call.
 
     Args:
-        function: pure function from mappings to mappings of arrays (..., *).
-        name: its subject in warnings and announcements.
+        function: Pure function from mappings to mappings of arrays (..., *).
+        name: Name of the function in warnings and announcements.
     """
 
     def __init__(self, function: Function, name: str) -> None:
         self._function, self._name = function, name
         self._loop: _Loop | None = None
         self.refused: str | None = None
-        """Reason why it runs in numpy; None if it is compiled or was not called yet."""
+        """Reason why the function runs in NumPy; None if it is compiled or was not
+        called yet."""
 
     @property
     def prepared(self) -> bool:
-        """True if it is compiled, or known to be impossible to compile."""
+        """True if the function is compiled, or cannot be compiled."""
         return self._loop is not None or self.refused is not None
 
     def prepare(self, *sources: Source) -> tuple[Sink, ...]:
-        """Compile for arrays like these; return their sinks, freshly allocated."""
+        """Compile for arrays like these and return the sinks, freshly allocated."""
         plain = self._function(*sources)
         off = os.environ.get("MARL_AIRHOCKEY_COMPILE", "1") == "0" or DISABLE_JIT
         if self._loop is None and self.refused is None and not off:
@@ -64,7 +64,7 @@ class Fused:
                 self._refuse(error)
         if self._loop is not None:
             return self._loop(sources)
-        # Copies, as numpy may have returned its arguments.
+        # Copies, because the function may have returned its arguments.
         return tuple(
             {key: np.array(array, order="C") for key, array in sink.items()}
             for sink in plain
@@ -88,11 +88,11 @@ class Fused:
         return self(*({k: _rows(v, worlds) for k, v in s.items()} for s in sources))
 
     def stage(self, sources: tuple[Source, ...], sinks: tuple[Sink, ...]) -> Stage:
-        """Return a stage that fills ``sinks`` from ``sources``, all kept by reference.
+        """Return a stage that fills ``sinks`` from ``sources``, stored by reference.
 
         Args:
-            sources: mappings like those that `prepare` got.
-            sinks: mappings like those that it returned.
+            sources: Mappings like the arguments of `prepare`.
+            sinks: Mappings like the results of `prepare`.
         """
         if self._loop is not None:
             return self._loop.stage(sources, sinks)
@@ -114,14 +114,14 @@ def _rows(value: Any, worlds: Array) -> Any:
 
 
 def _write(function: Function, sources: tuple[Source, ...], sinks: Any) -> None:
-    """Call a numpy function and copy its arrays into sinks."""
+    """Call a NumPy function and copy its arrays into sinks."""
     for made, sink in zip(function(*sources), sinks, strict=True):
         for key, array in sink.items():
             array[...] = made[key]
 
 
 class _Loop:
-    """Traced function as a compiled loop; copies and pickles hold only its source."""
+    """Traced function as a compiled loop. Copies and pickles hold only its source."""
 
     def __init__(
         self,
@@ -198,7 +198,7 @@ class _Loop:
         """Call the loop on copies of arrays that are not contiguous or of another type.
 
         Raises:
-            TypeError: a copy would lose precision.
+            TypeError: A copy would lose precision.
         """
         pairs = zip(arrays, self._kinds, strict=True)
         kernel = self._load().kernel
@@ -214,8 +214,8 @@ class _Loop:
 
 
 def _compare(done: tuple[Sink, ...], plain: tuple[Sink, ...]) -> None:
-    """Check that the loop computes the same as numpy did."""
+    """Check that the loop computes the same values as NumPy."""
     for mine, real in zip(done, plain, strict=True):
         for key, array in real.items():
             if not np.allclose(mine[key], array, 1e-5, 1e-6, equal_nan=True):
-                raise ValueError(f"{key} differs from what numpy makes of it")
+                raise ValueError(f"{key} differs from the result of numpy")

@@ -1,9 +1,9 @@
-"""Lowering: recorded operations as a loop over worlds, written directly for LLVM.
+"""Lowering: translates recorded operations to a loop over worlds in LLVM.
 
-Numba needs 7 ms for each line of Python that it compiles, and in functions of thousands
-of lines several times as much; its translation of a single operation on scalars takes a
-small part of that. So a loop is not written as Python: each of its operations is typed
-and translated by numba's own rules, as if it stood in a line of Python.
+Numba needs 7 ms for each line of Python that it compiles, and several times as much in
+functions of thousands of lines. Its translation of a single operation on scalars takes
+a small part of this time. A loop is therefore not written in Python. Numba's own rules
+type and translate each operation, as they do for a line of Python.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
 Argument = int | tuple[Any]
-"""Index of an earlier operation, or a number in a tuple"""
+"""Index of an earlier operation, or a number in a tuple."""
 Operation = tuple[Any, ...]
-"""Name of a numpy function and its arguments; "input", the index of an array and that
-of an element in a row of it"""
+"""Name of a NumPy function and its arguments; or "input", the index of an array, and
+the index of an element in a row of it."""
 Store = tuple[int, int, Argument]
-"""Index of an array, that of an element in a row of it, and what is stored there"""
+"""Index of an array, index of an element in a row of it, and stored value."""
 
 OPERATORS: dict[str, Callable[..., Any]] = {
     "add": operator.add,
@@ -41,13 +41,14 @@ OPERATORS: dict[str, Callable[..., Any]] = {
     "bitwise_and": operator.and_,
     "bitwise_or": operator.or_,
 }
-"""Operations for which numba has faster rules than for numpy's functions"""
+"""Operations for which numba has faster rules than for NumPy's functions."""
 COMPARED = {"maximum": operator.lt, "minimum": operator.gt}
-"""Comparisons by which a known number replaces a value"""
+"""Comparisons of a value with a known number. Where they are true, the number is the
+result."""
 
 
 class Value(NamedTuple):
-    """Value in LLVM, and its type."""
+    """LLVM value and its type."""
 
     type: Any
     llvm: Any
@@ -56,12 +57,12 @@ class Value(NamedTuple):
 def loop(
     sizes: Sequence[int], operations: Sequence[Operation], stores: Sequence[Store]
 ) -> Any:
-    """Return a function, for compiled code alone, of a tuple of arrays (B, *).
+    """Return a function of a tuple of arrays (B, *), for compiled code only.
 
     Args:
         sizes: Number of elements in a row of each array.
-        operations: Operations on one world, in their order.
-        stores: What is stored after them.
+        operations: Operations on one world, in order.
+        stores: Values that are stored after the operations.
     """
 
     @intrinsic
@@ -88,7 +89,7 @@ def loop(
 
 
 class _Row:
-    """Row of one world: its elements and the values that are computed of them."""
+    """Row of one world: its elements and the values that are computed from them."""
 
     def __init__(
         self,
@@ -106,7 +107,7 @@ class _Row:
             for view, size in zip(views, sizes, strict=True)
         ]
         self._known: dict[Any, tuple[Any, Any]] = {}
-        """Signatures and translations by function and types"""
+        """Signatures and translations by function and types."""
 
     def apply(self, name: str, given: Sequence[Any]) -> None:
         """Append the value of an operation."""
@@ -125,7 +126,7 @@ class _Row:
         elif name == "invert" and truths:
             done = self._call(operator.not_, *args)
         elif name in COMPARED and isinstance(given[1], tuple):
-            # As np.maximum and np.minimum, nan included, and faster.
+            # Same results as np.maximum and np.minimum, also for nan, but faster.
             condition = self._call(COMPARED[name], *args)
             done = self._select(condition, args[1], args[0])
         elif name in OPERATORS and not (truths and name in ("add", "multiply")):
@@ -163,7 +164,7 @@ class _Row:
         return Value(kind, self._builder.select(truth, *values))
 
     def _call(self, function: Any, *args: Value) -> Value:
-        """Return what a function makes of values, by numba's rules."""
+        """Apply a function to values by numba's rules."""
         key = function, *(a.type for a in args)
         if key not in self._known:
             typing = self._context.typing_context

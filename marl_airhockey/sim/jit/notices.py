@@ -1,4 +1,4 @@
-"""Notices on standard error while something is compiled: what, and for how long."""
+"""Notices on standard error during a compilation: its name and its duration."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 PAUSE = 2.0
-"""Time after a compilation from which the next one of its name is announced again, s"""
+"""Time after a compilation from which the next one with its name is announced again,
+s."""
 EVERY = 10.0
-"""Time between two notices, s"""
+"""Time between two notices, s."""
 FIRST, LATER = 50, 4
-"""Usual time to compile a scenario with an empty cache, and after another one, s"""
+"""Usual time to compile a scenario with an empty cache, and after another one, s."""
 
 
 @dataclass
 class _Notice:
-    """Times of what is waited for, of the monotonic clock, s."""
+    """Times of a compilation or of waiting for one, monotonic clock, s."""
 
     began: float
     said: float
@@ -27,7 +28,7 @@ class _Notice:
 
 
 _compilations: dict[str, _Notice] = {}
-"""The last compilation of each name, which consists of several in a row"""
+"""Last compilation with each name. It can consist of several compilations in a row."""
 
 
 @contextmanager
@@ -36,8 +37,9 @@ def announced_compilation(name: str, first: bool, why: str = "") -> Iterator[Non
 
     Args:
         name: Subject of the notices.
-        first: Whether nothing has been compiled on this machine yet.
-        why: Why the code that comes with the package is not used, if there is any.
+        first: True if nothing was compiled on this machine yet.
+        why: Reason why the code that comes with the package is not used; "" if the
+            package contains none.
     """
     notice, now = _compilations.get(name), time.monotonic()
     if notice is None or now - notice.ended > PAUSE:
@@ -52,7 +54,7 @@ def announced_compilation(name: str, first: bool, why: str = "") -> Iterator[Non
 
 @contextmanager
 def announced_wait(name: str) -> Iterator[None]:
-    """Say every ten seconds that another process compiles what this one needs."""
+    """Report every ten seconds that another process compiles the required code."""
     now = time.monotonic()
     with _repeated(f"another process compiles {name}", _Notice(now, now)):
         yield
@@ -63,8 +65,8 @@ def repeated(say: Callable[[], None], first: float | None = None) -> Iterator[No
     """Call a function every ten seconds, in a thread, until the block ends.
 
     Args:
-        say: Function.
-        first: Time until the first call, s; None for as long as between two.
+        say: Function to call.
+        first: Time until the first call, s; None for ten seconds.
     """
     over = threading.Event()
 

@@ -1,9 +1,9 @@
-"""Pipeline: functions called one after the other on fixed arrays.
+"""Pipeline: functions that are called one after the other on fixed arrays.
 
-Calling compiled code from Python costs some 50 ns per array, and allocating an array as
-much again: for one world, that is more than all the arithmetic. So neighbouring
-compiled stages become one compiled function, which finds its arrays by address. Stages
-in plain Python run between them. Both give the same numbers.
+A call of compiled code from Python costs about 50 ns per array, and the allocation of
+an array costs as much again. For one world, this is more than all the arithmetic.
+Neighbouring compiled stages therefore become one compiled function, which finds its
+arrays by address. Stages in plain Python run between them. The numbers are the same.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ class Fixed(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """Function, and the arguments that it is called with at every step."""
+    """Function, and the arguments with which it is called in every step."""
 
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
-    """Arrays (B, *), `Fixed` arrays and numbers; any values for a Python function"""
+    """Arrays (B, *), `Fixed` arrays and numbers; any values for a Python function."""
     stops: bool = False
-    """True if the function returns False to end the pipeline"""
+    """True if the function returns False to end the pipeline."""
     generated: bool = False
-    """True for a loop that was generated for one scenario"""
+    """True for a loop that was generated for one scenario."""
 
     def __call__(self) -> bool:
         """Call the function; return False if the pipeline must end."""
@@ -66,22 +66,22 @@ def pointer(_: Any, address: Any) -> Any:
 
 @njit(inline="always")
 def view(address: int, shape: Any, dtype: Any) -> Array:
-    """Return the array at an address, without an owner; for compiled code alone."""
+    """Return the array at an address, without an owner; for compiled code only."""
     return carray(pointer(address), shape, dtype)  # type: ignore[call-arg]
 
 
 class Pipeline:
-    """Stages of a step, called in their order.
+    """Stages of a step, called in order.
 
     Args:
-        rows: number of worlds B.
-        stages: stages of a step; their arrays must not be reallocated.
-        name: its subject in the announcement of a compilation.
+        rows: Number of worlds, B.
+        stages: Stages of a step. Their arrays must not be reallocated.
+        name: Subject of the announcement of a compilation.
     """
 
     def __init__(self, rows: int, stages: Sequence[Stage], name: str) -> None:
         self._parts: list[Stage | _Compiled] = []
-        # Apart from a scenario's own loop, as scenes alike then share what is compiled.
+        # Generated loops are compiled separately, so similar scenes share other code.
         for (compiled, _), group in groupby(stages, _kind):
             part = list(group)
             if compiled:
@@ -90,7 +90,7 @@ class Pipeline:
                 self._parts.extend(part)
 
     def __call__(self) -> bool:
-        """Call the stages in order; return False, without the rest, if one stops."""
+        """Call the stages in order; return False and skip the rest if one stops."""
         # A generator would cost more than the calls.
         for part in self._parts:  # noqa: SIM110
             if not part():
@@ -103,7 +103,7 @@ def _kind(stage: Stage) -> tuple[bool, bool]:
 
 
 class _Compiled:
-    """Stages as one compiled function, whose rows several threads may share."""
+    """Stages as one compiled function. Several threads can share its rows."""
 
     def __init__(self, rows: int, stages: Sequence[Stage], name: str) -> None:
         inputs = _Inputs()
@@ -132,19 +132,19 @@ class _Compiled:
 class _Inputs:
     """Integers that a pipeline's function reads: addresses and lengths of its arrays.
 
-    As they are no part of its source, scenes of different sizes share what is compiled.
+    They are not part of its source, so scenes of different sizes share compiled code.
     """
 
     def __init__(self) -> None:
         self.values: list[int] = []
         self.strides: list[int] = []
-        """Growth of each from one world to the next"""
+        """Increase of each value from one world to the next."""
         self._arrays: list[Array] = []
-        """Arrays, stored because the addresses are theirs"""
+        """Arrays, stored because the addresses refer to them."""
 
     def array(self, array: Array, shared: bool) -> str:
-        """Return the expression of an array, whose rows are worlds if not shared."""
-        assert array.flags.c_contiguous, "rows must lie one behind the other"
+        """Return the expression of an array, whose rows are worlds unless shared."""
+        assert array.flags.c_contiguous, "rows must be contiguous"
         self._arrays.append(array)
         address = self.number(array.ctypes.data, 0 if shared else array.strides[0])
         axes = [self.number(length) for length in array.shape[not shared :]]

@@ -1,10 +1,10 @@
-"""Compiled code that comes with the package, and whether it fits this machine.
+"""Compiled code that comes with the package, and a check that it fits this machine.
 
 ``airhockey precompile --target x86-64-v3`` compiles for a level of processors instead
-of the one at hand. A wheel that holds the result starts without compiling. Code fits
-if the versions of Python, numba and llvmlite and the system are the same and the
-processor has the level's features. Each function is found by its fingerprint, so code
-of other sources is never loaded.
+of the processor of this machine. A wheel that contains the result starts without
+compiling. The code fits if the system and the versions of Python, numba and llvmlite
+are the same, and the processor has the features of the level. Each function is found by
+its fingerprint, so code of other sources is never loaded.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from llvmlite import binding
 from marl_airhockey.sim.jit.folders import versions
 
 FOLDER = Path(__file__).parents[2] / "precompiled"
-"""Folder of the package that holds the code; absent in a checkout"""
+"""Folder of the package with the code; absent in a checkout."""
 MANIFEST = "manifest.json"
-"""File in it that names versions, target and features"""
+"""File in this folder that names versions, target and features."""
 VARIABLE = "MARL_AIRHOCKEY_PRECOMPILED"
-"""Environment variable that is 0 to ignore the code that comes with the package"""
+"""Environment variable that is 0 to ignore the code that comes with the package."""
 LEVELS: dict[str, tuple[str, ...]] = {
     "generic": (),
     # https://gitlab.com/x86-psABIs/x86-64-ABI, table 3.1
@@ -34,26 +34,26 @@ LEVELS: dict[str, tuple[str, ...]] = {
         *("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"),
     ),
 }
-"""Features of the levels of processors for which code can be compiled; "generic" is
-the least of each family, of aarch64 too"""
+"""Features of the levels of processors for which code can be compiled. "generic" is the
+lowest level of each family, including aarch64."""
 
 Target = tuple[str, str, str]
-"""System, processor and additional features, as numba names them"""
+"""System, processor and additional features, as numba names them."""
 
 
 class Shipped(NamedTuple):
     """Compiled code that comes with the package."""
 
     folder: Path | None
-    """None if there is none that fits"""
+    """Folder of the code; None if there is no code that fits."""
     target: Target
     reason: str
-    """Why it does not fit; empty if it does, or if there is none"""
+    """Reason why the code does not fit; empty if it fits or if there is none."""
 
 
 @cache
 def shipped() -> Shipped:
-    """Return the compiled code that comes with the package, if it fits here."""
+    """Return the compiled code of the package, if it fits this machine."""
     nothing: Target = ("", "", "")
     path = FOLDER / MANIFEST
     if os.environ.get(VARIABLE) == "0" or not path.exists():
@@ -70,7 +70,7 @@ def shipped() -> Shipped:
 
 
 def write_manifest(folder: Path, level: str) -> None:
-    """Write what the code in a folder is for.
+    """Write the manifest of compiled code: versions, target and features.
 
     Args:
         folder: Folder of compiled code.
@@ -85,7 +85,7 @@ def write_manifest(folder: Path, level: str) -> None:
 
 
 def _mismatch(manifest: dict[str, dict[str, str]]) -> str:
-    """Return in what this machine differs from what a manifest names; "" if nothing."""
+    """Return how this machine differs from a manifest; "" if it does not differ."""
     for name, here in versions().items():
         if manifest["versions"][name] != here:
             return f"is for {name} {manifest['versions'][name]}, not {here}"

@@ -1,7 +1,7 @@
-"""Threads over rows of worlds, used by loops that release Python's lock.
+"""Threads over rows of worlds, for loops that release the GIL.
 
-MARL_AIRHOCKEY_THREADS is the largest number of threads (default 1). They sleep while
-idle, so that they take no CPU time from other processes.
+MARL_AIRHOCKEY_THREADS is the largest number of threads (default 1). Idle threads sleep,
+so they take no CPU time from other processes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import cache
 from itertools import pairwise
 
 LEAST = 2048
-"""Number of rows of cheap worlds from which a thread pays."""
+"""Smallest number of rows of cheap worlds that is worth a thread."""
 
 
 @cache
@@ -21,7 +21,7 @@ def threads() -> int:
     """Return the largest number of threads.
 
     Raises:
-        ValueError: MARL_AIRHOCKEY_THREADS is no whole number above 0.
+        ValueError: MARL_AIRHOCKEY_THREADS is not a whole number above 0.
     """
     given = os.environ.get("MARL_AIRHOCKEY_THREADS", "1")
     if not given.isdigit() or int(given) < 1:
@@ -35,7 +35,7 @@ def use_threads(number: int | None) -> int | None:
     """Set the number of threads in this process and its future child processes.
 
     Raises:
-        ValueError: fewer than one.
+        ValueError: The number is below 1.
     """
     if number is not None:
         os.environ["MARL_AIRHOCKEY_THREADS"] = str(number)
@@ -59,9 +59,9 @@ def over_rows(work: Callable[[slice], None], rows: int, least: int = LEAST) -> N
     """Call ``work`` on slices of rows 0 .. ``rows`` in parallel.
 
     Args:
-        work: function of a slice.
-        rows: number of rows.
-        least: number of rows from which a thread pays.
+        work: Function of a slice.
+        rows: Number of rows.
+        least: Smallest number of rows that is worth a thread.
     """
     parts = min(threads(), rows // least)
     if parts < 2:
@@ -74,5 +74,5 @@ def over_rows(work: Callable[[slice], None], rows: int, least: int = LEAST) -> N
 
 
 def spreads(rows: int) -> bool:
-    """Return True if this number of rows is shared by several threads."""
+    """Return True if several threads share this number of rows."""
     return threads() > 1 and rows >= 2 * LEAST

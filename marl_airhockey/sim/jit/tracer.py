@@ -1,7 +1,7 @@
-"""Tracer: numpy code that runs on its symbols records the arithmetic of one world.
+"""Tracer: records the arithmetic of one world while NumPy code runs on its symbols.
 
-An array of symbols is an object array, so that indexing, broadcasting and stacking are
-numpy's own; only arithmetic is recorded, element by element.
+An array of symbols is an object array. NumPy itself indexes, broadcasts and stacks it.
+Only arithmetic is recorded, element by element.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
 
 
 class Tape:
-    """Symbols of a trace, each operation once, in the order of creation."""
+    """Symbols of a trace, in the order of creation. Each operation appears once."""
 
     def __init__(self) -> None:
         self.symbols: dict[Any, Symbol] = {}
@@ -105,9 +105,9 @@ def _clip(x: Any, low: Any, high: Any) -> Symbols:
 
 
 def _matmul(a: Any, b: Any) -> Any:
-    """Multiply matrices without the terms of known zeros, of which rotations are full.
+    """Multiply matrices without the terms of known zeros, as rotations have many.
 
-    Where the other factor of such a term is infinite, numpy makes a nan of it.
+    If the other factor of such a term is infinite, NumPy would return nan.
     """
     a, b = (np.asarray(x).astype(object) for x in (a, b))
     columns = np.swapaxes(b, -1, -2)[..., None, :, :]
@@ -140,7 +140,7 @@ SPECIAL: dict[Any, Callable[..., Any]] = {
     np.zeros_like: _zeros_like,
     np.full_like: _full_like,
 }
-"""Rules for numpy functions that do not work element by element."""
+"""Rules for NumPy functions that do not work element by element."""
 
 
 class Symbols(np.ndarray[Any, Any]):

@@ -1,1 +1,1 @@
-"""Pictures, windows and videos."""
+"""Images, windows and videos of worlds."""

@@ -1,4 +1,4 @@
-"""Anti-aliased canvas with coordinates in metres, by OpenCV."""
+"""Anti-aliased canvas with coordinates in metres, which uses OpenCV."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
 Colour = tuple[int, int, int]
-"""RGB, 0 to 255"""
+"""Colour in RGB, 0 to 255."""
 ROOM: Colour = (236, 239, 243)
 SMOOTH = 2
-"""Factor by which pictures are drawn larger, to be averaged down"""
+"""Factor by which the canvas is larger than the image, for anti-aliasing."""
 SHIFT = 6
-"""Fractional bits of OpenCV's fixed-point coordinates"""
+"""Number of fractional bits of OpenCV's fixed-point coordinates."""
 
 
 class Canvas:
-    """Canvas in metres (table frame): the table's bounding box and a margin.
+    """Canvas of the table's bounding box and a margin, table frame, m.
 
     Args:
-        table: the table.
-        width: width of the finished picture, pixels.
-        margin: space around the table, m.
-        bar: height of the title bar, pixels of the finished picture.
+        table: Table that the canvas shows.
+        width: Width of the image, pixels.
+        margin: Margin around the table, m.
+        bar: Height of the title bar in the image, pixels.
     """
 
     def __init__(self, table: Table, width: int, margin: float, bar: int) -> None:
@@ -35,13 +35,13 @@ class Canvas:
         self.scale = SMOOTH * width / float(high[0] - self.low[0])
         self.bar = SMOOTH * bar
         tall = round(float(high[1] - self.low[1]) * self.scale) + self.bar
-        # Even sizes: video codecs want them.
+        # Video codecs require even sizes.
         tall += -tall % (2 * SMOOTH)
         self.image = np.full((tall, SMOOTH * width, 3), ROOM, np.uint8)
         self.bottom = tall
 
     def pixel(self, point: Sequence[float] | Array) -> tuple[int, int]:
-        """Return the fixed-point pixel of a point (2,) m."""
+        """Return the fixed-point pixel of a point (2,), table frame, m."""
         x = (float(point[0]) - self.low[0]) * self.scale
         y = self.bottom - (float(point[1]) - self.low[1]) * self.scale
         return round(x * 2**SHIFT), round(y * 2**SHIFT)
@@ -49,7 +49,7 @@ class Canvas:
     def disc(
         self, centre: Sequence[float] | Array, radius: float, colour: Colour
     ) -> None:
-        """Draw a filled disc; centre and radius in m."""
+        """Draw a filled disc; centre (2,) and radius in m."""
         size = max(round(radius * self.scale * 2**SHIFT), 1)
         cv2.circle(self.image, self.pixel(centre), size, colour, -1, cv2.LINE_AA, SHIFT)
 
@@ -60,7 +60,7 @@ class Canvas:
         colour: Colour,
         width: float = 1.5,
     ) -> None:
-        """Draw a circle (m) with a line ``width`` pixels wide."""
+        """Draw a circle; centre (2,) and radius in m, width of the line in pixels."""
         size = max(round(radius * self.scale * 2**SHIFT), 1)
         line = max(round(width * SMOOTH), 1)
         cv2.circle(
@@ -74,13 +74,13 @@ class Canvas:
         colour: Colour,
         width: float = 1.5,
     ) -> None:
-        """Draw a straight line (m), ``width`` pixels wide."""
+        """Draw a straight line; ends (2,) in m, width in pixels."""
         wide = max(round(width * SMOOTH), 1)
         a, b = self.pixel(start), self.pixel(end)
         cv2.line(self.image, a, b, colour, wide, cv2.LINE_AA, SHIFT)
 
     def polygon(self, corners: Array, colour: Colour, width: float = 0.0) -> None:
-        """Fill a polygon (K, 2) m, or with ``width`` (pixels) draw its outline."""
+        """Fill a polygon (K, 2), m, or draw its outline with ``width`` in pixels."""
         points = np.array([self.pixel(c) for c in corners], np.int32)
         if width:
             wide = max(round(width * SMOOTH), 1)
@@ -91,7 +91,7 @@ class Canvas:
     def text(
         self, words: str, x: int, size: float, colour: Colour, right: bool
     ) -> None:
-        """Write words in the title bar, ``x`` pixels from its left or right end."""
+        """Write a text in the title bar, ``x`` pixels from its left or right end."""
         font, thick = cv2.FONT_HERSHEY_DUPLEX, SMOOTH
         scale = size * SMOOTH
         (wide, high), _ = cv2.getTextSize(words, font, scale, thick)
@@ -100,6 +100,6 @@ class Canvas:
         cv2.putText(self.image, words, corner, font, scale, colour, thick, cv2.LINE_AA)
 
     def finish(self) -> Array:
-        """Return the finished picture (H, W, 3) uint8 RGB, freshly allocated."""
+        """Return the image (H, W, 3) uint8 RGB, a new array."""
         size = (self.image.shape[1] // SMOOTH, self.image.shape[0] // SMOOTH)
         return np.asarray(cv2.resize(self.image, size, interpolation=cv2.INTER_AREA))

@@ -1,4 +1,4 @@
-"""MP4: videos with H.264, which every browser plays."""
+"""MP4: videos with H.264, which all browsers support."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from marl_airhockey.sim.core.errors import require
 from marl_airhockey.types import Array
 
 OPTIONS = {"crf": "20", "preset": "veryfast"}
-"""Quality and effort of the encoder"""
+"""Quality and speed of the encoder."""
 
 
 class Mp4Writer:
@@ -20,7 +20,7 @@ class Mp4Writer:
 
     Args:
         path: Path of the file.
-        fps: Images per second.
+        fps: Number of images per second.
 
     Raises:
         RuntimeError: PyAV is not installed.
@@ -36,7 +36,7 @@ class Mp4Writer:
         self._stream: Any = None
 
     def append(self, image: Array) -> None:
-        """Append an image (H, W, 3) uint8 RGB; H.264 needs an even height and width."""
+        """Append an image (H, W, 3) uint8 RGB, cropped to an even height and width."""
         import av
 
         height, width = (2 * (size // 2) for size in image.shape[:2])
@@ -49,7 +49,7 @@ class Mp4Writer:
         self._file.mux(self._stream.encode(frame))
 
     def close(self) -> None:
-        """Write what the encoder still holds, and close the file."""
+        """Write the remaining frames of the encoder, and close the file."""
         if self._stream is not None:
             self._file.mux(self._stream.encode(None))
         self._file.close()

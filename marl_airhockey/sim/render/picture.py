@@ -1,7 +1,7 @@
-"""Pictures of the 2D table from above: anti-aliased, home on the left.
+"""Anti-aliased images of the 2D table from above, with the home end on the left.
 
-`draw` makes a picture of a `Frame`: the source of what environments render, of the
-docs' pictures and of videos.
+`draw` renders a `Frame`. Environments, videos and the images of the documentation use
+it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SEAT_COLOURS: tuple[Colour, ...] = (
     (86, 180, 233),
     (230, 159, 0),
 )
-"""RGB colours of seats: Okabe and Ito's palette, safe for colour-blind people"""
+"""Colours of seats, RGB: Okabe and Ito's palette, safe for colour-blind people."""
 RAIL, FIELD = (52, 62, 76), (250, 251, 253)
 PRINT, FAINT, INK = (168, 196, 224), (214, 226, 238), (34, 40, 49)
 PUCK, PUCK_RIM, BLOCK, BLOCK_RIM = (
@@ -42,39 +42,39 @@ CIRCLES: dict[Meaning, Colour] = {
     "cost": (213, 94, 0),
     "drag": (105, 116, 134),
 }
-"""Colours of circles by what they mean"""
+"""Colours of circles by meaning."""
 SIGNS: dict[Meaning, list[tuple[float, float, float, float]]] = {
     "reward": [(-1, 0, 1, 0), (0, -1, 0, 1)],
     "cost": [(-1, 0, 1, 0)],
     "drag": [(-1, -0.5, 1, -0.5), (-1, 0.5, 1, 0.5)],
 }
-"""Lines of a sign in the middle of a region, in quarters of its radius"""
+"""Lines of the sign at the centre of a region, in quarters of its radius."""
 WIDTH = 880
-"""Width of a picture unless another is given, pixels"""
+"""Default width of an image, pixels."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Contents of a picture of one world."""
+    """Contents of an image of one world."""
 
     scene: Scene
     state: State
-    """State without leading axes"""
+    """State without leading axes."""
     marks: Sequence[Mark] = ()
     trails: Sequence[Sequence[tuple[float, float]]] = ()
-    """Recent positions of each puck, oldest first, m"""
+    """Recent positions of each puck, oldest first, table frame, m."""
     title: str = ""
     note: str = ""
-    """Text at the right of the title bar, say the score"""
+    """Text at the right of the title bar, for example the score."""
     clock: float = 0.0
-    """Share of the episode that is over, 0 to 1"""
+    """Share of the time limit that has passed, 0 to 1."""
     success: bool = False
     eliminated: Sequence[bool] = ()
-    """Flags of the seats that are out of the game; empty if seats cannot retire"""
+    """True for eliminated seats (seats,); empty if no seat can be eliminated."""
 
 
 def draw(frame: Frame, width: int = WIDTH) -> Array:
-    """Draw a picture (H, W, 3) uint8 RGB, ``width`` pixels wide."""
+    """Return the image (H, W, 3) uint8 RGB of a frame, ``width`` pixels wide."""
     canvas = Canvas(frame.scene.table, width, margin=0.075, bar=44)
     _table(canvas, frame)
     for mark in frame.marks:
@@ -83,7 +83,7 @@ def draw(frame: Frame, width: int = WIDTH) -> Array:
         _trail(canvas, trail, frame.scene.table.puck_radius)
     _bodies(canvas, frame.scene, frame.state)
     for mark in frame.marks:
-        # A goal that a paddle can hide is drawn over it.
+        # Draw a goal that a paddle can hide again, over the paddle.
         goal = mark.kind == "circle" and mark.means == "goal"
         if goal and mark.radius < frame.scene.table.paddle_radius:
             canvas.ring(mark.start, mark.radius, GOAL, 2)
@@ -179,7 +179,7 @@ def _bodies(canvas: Canvas, scene: Scene, state: State) -> None:
         canvas.disc(position[k], radius[k], PUCK)
         canvas.ring(position[k], radius[k] * 0.96, PUCK_RIM, 1)
         canvas.ring(position[k], radius[k] * 0.55, _pale(PUCK, 0.35), thin)
-        # A stripe shows how it spins.
+        # A stripe shows the spin.
         angle = float(state.angle[k])
         arm = 0.55 * radius[k] * np.array([np.cos(angle), np.sin(angle)])
         canvas.line(position[k] - arm, position[k] + arm, _pale(PUCK, 0.35), thin)
@@ -198,7 +198,7 @@ def _bar(canvas: Canvas, frame: Frame) -> None:
 
 
 def _seat_colour(scene: Scene, seat: int) -> Colour:
-    """Return a colour of the seat's own, or the team's, paler for later teammates."""
+    """Return the colour of a seat or its team, paler for later teammates."""
     teams = [s.team for s in scene.seats]
     if len(set(teams)) in (1, len(teams)):
         return SEAT_COLOURS[seat % len(SEAT_COLOURS)]

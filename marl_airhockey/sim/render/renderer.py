@@ -1,4 +1,4 @@
-"""Renderer of one world: pictures with trails of the pucks, or a window."""
+"""Renderer of one world: images with trails of the pucks, or a window."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ if TYPE_CHECKING:
     from marl_airhockey.sim.render.window import Window
 
 TOP = "top"
-"""Name of the view from above, drawn in 2D, which every backend has"""
+"""Name of the 2D view from above, which every backend supports."""
 
 
 class Renderer:
-    """Pictures of one world of a batch, in a window if ``mode`` is "human".
+    """Renderer of one world of a batch, with a window if ``mode`` is "human".
 
     Args:
-        world: the worlds; read, not changed.
-        mode: "rgb_array" or "human".
-        title: text at the left of the title bar.
-        index: number of the world that is shown.
-        viewpoint: `TOP`, or one of the backend's viewpoints.
+        world: Worlds, which are not changed.
+        mode: Render mode, "rgb_array" or "human".
+        title: Text at the left of the title bar.
+        index: Index of the rendered world.
+        viewpoint: Camera, `TOP` or one of the backend's viewpoints.
 
     Raises:
-        ValueError: unknown mode or viewpoint, with the names there are.
+        ValueError: The mode or the viewpoint is unknown; the message lists all names.
     """
 
     MODES = ("rgb_array", "human")
     TRAIL = 24
-    """Longest trail of a puck, control steps"""
+    """Length of the longest trail of a puck, control steps."""
 
     def __init__(
         self, world: World, mode: str, title: str, index: int = 0, viewpoint: str = TOP
@@ -48,16 +48,16 @@ class Renderer:
         self.begin()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave an open window behind: a copy opens its own when it shows something."""
+        """Return the attributes without the window; a copy opens its own window."""
         return {**vars(self), "_window": None}
 
     def begin(self) -> None:
-        """Clear the trails at the begin of an episode."""
+        """Clear the trails when an episode begins."""
         pucks = range(self.world.scene.pucks)
         self._trails: list[list[tuple[float, float]]] = [[] for _ in pucks]
 
     def follow(self) -> None:
-        """Lengthen the trails after a reset or a step; in human mode show a picture."""
+        """Extend the trails after a reset or a step; in human mode, show an image."""
         pucks = self.world.state.puck[self.index]
         for trail, puck in zip(self._trails, pucks, strict=True):
             trail.append((float(puck[0]), float(puck[1])))
@@ -66,7 +66,7 @@ class Renderer:
             self.show()
 
     def frame(self) -> Frame:
-        """Return the contents of a picture of the world as it is now."""
+        """Return the contents of an image of the current state."""
         world, i = self.world, self.index
         state = world.state.map(lambda x: x[i])
         memory = {name: value[i] for name, value in world.memory.items()}
@@ -87,7 +87,7 @@ class Renderer:
         )
 
     def take_picture(self, width: int = WIDTH) -> Array:
-        """Return a picture (H, W, 3) uint8 RGB, ``width`` pixels wide, as it is now."""
+        """Return an image (H, W, 3) uint8 RGB of the current state; width in pixels."""
         frame = self.frame()
         if self.viewpoint == TOP:
             return draw(frame, width)
@@ -95,13 +95,13 @@ class Renderer:
         return backend.photograph(self.index, self.viewpoint, frame.marks, width)
 
     def show(self) -> Array | None:
-        """Return the picture; in human mode put it on the window and return None.
+        """Return the image; in human mode, show it in the window and return None.
 
         Raises:
-            RuntimeError: no episode has begun.
+            RuntimeError: No episode has begun.
         """
         if not self.world.episode.number[self.index]:
-            raise RuntimeError("render: call reset() first; there is nothing to see")
+            raise RuntimeError("render: no episode has begun; call reset() first")
         picture = self.take_picture()
         if self.mode == "rgb_array":
             return picture

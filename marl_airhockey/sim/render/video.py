@@ -1,4 +1,4 @@
-"""Video files: GIF and WebP by Pillow, MP4 by PyAV."""
+"""Video files: GIF and WebP with Pillow, MP4 with PyAV."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from marl_airhockey.sim.render.mp4 import Mp4Writer
 from marl_airhockey.types import Array
 
 WIDTHS = {".mp4": 1280}
-"""Width of a video by the ending of its file, px"""
+"""Width of a video by the suffix of its file, pixels."""
 USUAL_WIDTH = 640
-"""Width of other videos, px"""
+"""Width of other videos, pixels."""
 QUALITY = 10
-"""Quality of WebP, 0 .. 100"""
+"""Quality of WebP, 0 to 100."""
 
 
 def write_video(path: Path | str, pictures: Sequence[Array], fps: float) -> Path:
-    """Write pictures (H, W, 3) uint8 RGB as a video; return its path.
+    """Write images as a video; return the path.
 
     Args:
-        path: File to write, .gif, .webp or .mp4; its folder is made.
-        pictures: Pictures of one size.
-        fps: Pictures per second.
+        path: Path of the file, .gif, .webp or .mp4. Its folder is created.
+        pictures: Images (H, W, 3) uint8 RGB of one size.
+        fps: Number of images per second.
 
     Raises:
-        ValueError: No pictures, or another ending.
+        ValueError: There are no images, or the suffix is unknown.
         OSError: The file could not be written.
     """
     path = Path(path)
     if not pictures:
-        raise ValueError("video: no pictures to write")
+        raise ValueError("video: no images were given")
     path.parent.mkdir(parents=True, exist_ok=True)
     check_ending(path)
     WRITERS[path.suffix](path, pictures, fps)
@@ -41,15 +41,15 @@ def write_video(path: Path | str, pictures: Sequence[Array], fps: float) -> Path
 
 
 def width_of(path: Path | str) -> int:
-    """Return the usual width of a video, px."""
+    """Return the default width of a video, pixels."""
     return WIDTHS.get(Path(path).suffix, USUAL_WIDTH)
 
 
 def check_ending(path: Path) -> None:
-    """Refuse the name of a file that is no video.
+    """Check that the suffix of a file is that of a video.
 
     Raises:
-        ValueError: Another ending than those of `WRITERS`.
+        ValueError: The suffix is not one of `WRITERS`.
     """
     if path.suffix not in WRITERS:
         endings = ", ".join(WRITERS)
@@ -57,7 +57,7 @@ def check_ending(path: Path) -> None:
 
 
 def _write_gif(path: Path, pictures: Sequence[Array], fps: float) -> None:
-    # One palette and no dithering: frames then differ only where things move.
+    # With one palette and no dithering, frames differ only where bodies move.
     some = [pictures[0], pictures[len(pictures) // 2], pictures[-1]]
     palette = Image.fromarray(np.concatenate(some)).quantize(128)
     frames = [
@@ -69,7 +69,7 @@ def _write_gif(path: Path, pictures: Sequence[Array], fps: float) -> None:
 
 
 def _write_webp(path: Path, pictures: Sequence[Array], fps: float) -> None:
-    # For pictures of a camera, whose noise makes a GIF forty times as large.
+    # For camera images, whose noise makes a GIF forty times larger.
     first, *rest = (Image.fromarray(picture) for picture in pictures)
     duration = round(1000 / fps)
     first.save(
@@ -94,4 +94,4 @@ WRITERS: dict[str, Callable[[Path, Sequence[Array], float], None]] = {
     ".webp": _write_webp,
     ".mp4": _write_mp4,
 }
-"""Writers of videos by the ending of the file"""
+"""Writers of videos by the suffix of the file."""

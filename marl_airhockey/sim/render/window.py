@@ -1,4 +1,4 @@
-"""Window of render_mode="human", by pygame-ce."""
+"""Window of render_mode="human", which uses pygame-ce."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from marl_airhockey.types import Array
 
 
 class Window:
-    """Window that shows pictures at the pace of the game.
+    """Window that shows images in real time.
 
     Args:
-        width: width, pixels.
-        height: height, pixels.
-        rate: pictures per second.
+        width: Width of the window, pixels.
+        height: Height of the window, pixels.
+        rate: Number of images per second.
 
     Raises:
-        RuntimeError: pygame-ce is missing.
+        RuntimeError: pygame-ce is not installed.
     """
 
     def __init__(self, width: int, height: int, rate: float) -> None:
@@ -29,7 +29,7 @@ class Window:
         self._clock = pygame.time.Clock()
 
     def show(self, picture: Array) -> None:
-        """Put a picture (H, W, 3) uint8 on the screen and wait until the next."""
+        """Show an image (H, W, 3) uint8, and wait until the next one is due."""
         pygame = self._pygame
         pygame.event.pump()
         surface = pygame.surfarray.make_surface(picture.swapaxes(0, 1))

@@ -1,1 +1,1 @@
-"""Sensing: sensed states with delay, noise and occlusion, and their history."""
+"""Simulated sensing: states with latency, noise and occlusion, and their history."""

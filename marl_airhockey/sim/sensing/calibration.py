@@ -1,4 +1,4 @@
-"""Calibration error: a smooth error of the sensed positions, fixed in an episode."""
+"""Calibration error: a smooth error of sensed positions, constant in an episode."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from marl_airhockey.types import Array
 WAVES = 4
 """Number of plane waves in a map, for each component."""
 LENGTHS = (0.7, 1.4)
-"""Range of the wavelengths, in widths of the table; a map that was measured on a real
-table had a period of about one width."""
+"""Range of the wavelengths, in widths of the table. The error that was measured on a
+real table had a period of about one width."""
 
 
 class Waves(NamedTuple):
     """Plane waves of the maps of B worlds, for both components."""
 
     x: Array
-    """(B, WAVES, 2) wave numbers along x, rad/m"""
+    """Wave numbers along x (B, WAVES, 2), rad/m."""
     y: Array
-    """(B, WAVES, 2) wave numbers along y, rad/m"""
+    """Wave numbers along y (B, WAVES, 2), rad/m."""
     phase: Array
-    """(B, WAVES, 2) phases, rad"""
+    """Phases (B, WAVES, 2), rad."""
     height: Array
-    """(B,) amplitudes, m"""
+    """Amplitudes (B,), m."""
 
 
 class CalibrationMap:
@@ -47,12 +47,12 @@ class CalibrationMap:
         self.waves = Waves(x, y, phase, np.zeros(worlds))
 
     def sample(self, rng: RandomStreams, sd: Array, worlds: Array) -> None:
-        """Sample new maps for some worlds, by index (W,).
+        """Sample new maps for some worlds.
 
         Args:
-            rng: Streams of these worlds.
+            rng: Random streams of these worlds.
             sd: Standard deviations (W,), m.
-            worlds: Indices of the worlds.
+            worlds: Indices (W,) of the worlds.
         """
         unit, waves = rng.units(3, WAVES, 2), self.waves
         low, high = (2.0 * np.pi / (self._width * length) for length in LENGTHS[::-1])
@@ -64,7 +64,7 @@ class CalibrationMap:
         waves.height[worlds] = sd * np.sqrt(2.0 / WAVES)
 
     def shifted(self, position: Array, worlds: Array) -> Array:
-        """Return positions (W, n, 2) in some worlds, by index, with the error, m."""
+        """Add the error to positions (W, n, 2) in some worlds, by index (W,), m."""
         out = np.empty(position.shape)
         _shift(self.waves, worlds, position, out)
         return out
@@ -80,7 +80,7 @@ def _shift(waves: Waves, worlds: Array, position: Array, out: Array) -> None:
 
 @compiled(nogil=True, error_model="numpy")
 def shift(waves: Waves, w: int, x: float, y: float) -> tuple[float, float]:
-    """Return a position in a world with the error added, m."""
+    """Add the error to a position in world ``w``, m."""
     dx = dy = 0.0
     for k in range(WAVES):
         phase = waves.phase[w, k]

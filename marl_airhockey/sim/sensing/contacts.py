@@ -1,8 +1,9 @@
-"""Contacts of pucks with paddles, as they can be known from delayed frames of a camera.
+"""Contacts of pucks with paddles, detected in delayed frames of a camera.
 
-A camera rarely takes a frame at the moment of a contact. So the puck's path is
-extrapolated forward from the older frame and backward from the newer one. There was a
-contact where one of these paths meets a paddle that the puck moves toward, or leaves.
+A camera rarely takes a frame at the moment of a contact. The puck's path is therefore
+extrapolated forward from the older frame and backward from the newer one. A contact is
+detected where one of these paths meets a paddle, and the puck moves toward this paddle
+or away from it.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.types import Array
 
 MOMENTS = 9
-"""Number of times between two frames at which the paths are checked"""
+"""Number of times between two frames at which the paths are checked."""
 MARGIN = 0.004
-"""Largest gap that counts as a contact, m, for errors of calibration and noise"""
+"""Largest gap that counts as a contact, m, for errors of calibration and noise."""
 
 
 class ContactSensor:
@@ -25,30 +26,31 @@ class ContactSensor:
     Args:
         scene: Bodies and their sizes.
         worlds: Number of worlds, B.
-        control_dt: Time of a control step, s.
+        control_dt: Length of a control step, s.
     """
 
     def __init__(self, scene: Scene, worlds: int, control_dt: float) -> None:
         bodies, table = scene.bodies, scene.table
         self._near, self._dt = table.puck_radius + table.paddle_radius, control_dt
         self._tracks = np.zeros((worlds, bodies.pucks, 5))
-        """Last frame of each puck: time, s, x, y, m, vx, vy, m/s"""
+        """Last frame of each puck: time, s; x and y, m; vx and vy, m/s."""
         pairs = worlds, bodies.paddles, bodies.pucks
         self.touched = np.zeros(pairs, np.int64)
-        """(B, paddles, pucks) number of contacts that began, as in `State`"""
+        """Number of contacts that began (B, paddles, pucks), as in `State`."""
         self.touched_at = np.full(pairs, np.nan)
-        """(B, paddles, pucks) their time into the step, s, negative where it was before
-        the step; nan without any"""
+        """Time of the contact relative to the start of the step (B, paddles, pucks), s;
+        negative before the step, nan without a contact."""
         self.touching = np.zeros(pairs, np.bool_)
-        """(B, paddles, pucks) True if in contact in the newest frame"""
+        """True for a contact in the newest frame (B, paddles, pucks)."""
 
     def reset(self, worlds: Array, taken: Array, track: Array) -> None:
-        """Forget all contacts in some worlds, by index.
+        """Delete all contacts in some worlds.
 
         Args:
             worlds: Indices (W,) of the worlds.
-            taken: (B, pucks and more) time of a frame, s.
-            track: (B, pucks and more, 4 and more) position, m, velocity, m/s, in it.
+            taken: Times of a frame (B, n) by body, pucks first, s.
+            track: Positions, m, and velocities, m/s, in the frame (B, n, 4 or more),
+                pucks first.
         """
         pucks = self._tracks.shape[1]
         self._tracks[worlds, :, 0] = taken[worlds, :pucks]
@@ -63,11 +65,12 @@ class ContactSensor:
 
         Args:
             worlds: Indices (W,) of the worlds.
-            taken: (B, pucks and more) time of the frames, s.
-            track: (B, pucks and more, 4 and more) position, m, velocity, m/s, in them.
-            paddles: Paths (B, n, S, 2) of the paddles, a control step apart, the last
-                position that of now, m.
-            now: Times (B,) now, s.
+            taken: Times of the newest frames (B, n) by body, pucks first, s.
+            track: Positions, m, and velocities, m/s, in these frames (B, n, 4 or more),
+                pucks first.
+            paddles: Positions (B, steps, S, 2) of the paddles at the last control
+                steps, up to now, m.
+            now: Current times (B,), s.
         """
         state = self._tracks, self.touched, self.touched_at, self.touching
         _update(worlds, taken, track, paddles, now, self._near, self._dt, *state)
@@ -112,14 +115,14 @@ def contact_time(
     """Return the time of a puck's contact with a paddle between two frames, s.
 
     Args:
-        before: (5,) time, s, x, y, m, vx, vy, m/s, of the puck in the older frame.
-        after: The same in the newer frame.
-        times: (n,) times of the paddle's positions, s.
-        paddle: (n, 2) positions of the paddle, m.
+        before: Puck in the older frame (5,): time, s; x and y, m; vx and vy, m/s.
+        after: Puck in the newer frame (5,), with the same elements.
+        times: Times (n,) of the paddle's positions, s.
+        paddle: Positions (n, 2) of the paddle, m.
         near: Distance between the centres in contact, m.
 
     Returns:
-        The time; nan without a contact.
+        Time of the contact; nan without a contact.
     """
     span, first = after[0] - before[0], np.nan
     start_x, start_y = _at(times, paddle, before[0])
@@ -140,7 +143,7 @@ def contact_time(
         back_x = after[1] - (1.0 - share) * span * after[3] - x
         back_y = after[2] - (1.0 - share) * span * after[4] - y
         ahead = on_x * on_x + on_y * on_y < beyond
-        # Each path is trusted in the half that is nearer to its frame.
+        # Each path is used in the half of the time that is nearer to its frame.
         met = (k <= half and ahead) or (
             k >= half and back_x * back_x + back_y * back_y < beyond
         )
@@ -153,7 +156,7 @@ def contact_time(
 
 @compiled(nogil=True, error_model="numpy")
 def _at(times: Array, path: Array, at: float) -> tuple[float, float]:
-    """Return a point of a path (n, 2) at some time, interpolated."""
+    """Return the point of a path (n, 2) at a time by linear interpolation."""
     if at <= times[0]:
         return path[0, 0], path[0, 1]
     for k in range(1, len(times)):

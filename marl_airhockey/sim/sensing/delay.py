@@ -1,4 +1,4 @@
-"""Delay lines: values of B worlds from some time ago."""
+"""Delay lines: past values of B worlds."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from marl_airhockey.types import Array, Rows
 
 
 def depth(longest: float, control_dt: float) -> int:
-    """Return the number of samples, one a step, that delays up to ``longest`` need."""
+    """Return the number of samples, one per step, for delays up to ``longest``, s."""
     return int(np.ceil(longest / control_dt - 1e-9)) + 1
 
 
@@ -33,7 +33,7 @@ class Delay:
         self._past[rows] = past
 
     def push(self, value: Array, delay: Array) -> Array:
-        """Append the newest value (B, ...); return that of ``delay`` (B,) s ago."""
+        """Append the newest value (B, ...); return the value ``delay`` (B,) s ago."""
         past, out = self._past, np.empty(value.shape)
         flat = past.reshape(*past.shape[:2], -1), value.reshape(len(value), -1)
         _push(*flat, delay, self.control_dt, out.reshape(len(value), -1))
@@ -51,7 +51,7 @@ def _push(past: Array, value: Array, delay: Array, dt: float, out: Array) -> Non
 
 @inner(error_model="numpy")
 def append(past: Array, newest: Array) -> None:
-    """Append a value (n,) to a past (depth, n), whose oldest value is lost."""
+    """Append a value (n,) to a past (depth, n) and drop the oldest value."""
     for k in range(len(past) - 1):
         past[k] = past[k + 1]
     past[-1] = newest
@@ -63,7 +63,7 @@ def around(samples: int, back: float) -> tuple[int, int, float]:
 
     Returns:
         The indices before and after that time, and the share of the step between them
-        that lies before it.
+        that precedes it.
     """
     whole = int(np.floor(back))
     newer = samples - 1 - whole
@@ -74,15 +74,15 @@ def around(samples: int, back: float) -> tuple[int, int, float]:
 def position_before(past: Array, delay: float, dt: float) -> tuple[float, float]:
     """Return the position of a body ``delay`` s before its last sample, m.
 
-    Its trajectory is straight except for one kink within a step, where the straight
-    lines before and after the step meet, as at a wall bounce or a hit. If they are
-    parallel, it is in the middle of the step. The error is then 0.3 mm for an
+    The trajectory is straight except for one kink within a step, as at a wall bounce or
+    a hit. The kink is where the straight lines before and after the step meet. If they
+    are parallel, it is in the middle of the step. The error is then 0.3 mm for an
     acceleration of 0.94 m/s2 over 50 ms.
 
     Args:
-        past: Samples (depth, 4), a step apart: x, y, m, vx, vy, m/s.
+        past: Samples (depth, 4), a step apart: x and y, m; vx and vy, m/s.
         delay: Time before the last sample, s.
-        dt: Time of a step, s.
+        dt: Length of a step, s.
     """
     before, after, share = around(len(past), delay / dt)
     older, newer = past[before], past[after]

@@ -1,8 +1,9 @@
-"""Estimator: positions and velocities of pucks now, from a camera's delayed frames.
+"""Estimator: current positions and velocities of pucks, from delayed camera frames.
 
-A Kalman filter with a physics model of the table: drag, slope, wall bounces and hits by
-paddles, whose paths are known. Every frame corrects it. The output is the prediction
-for now, which compensates delay, noise and short occlusions as far as the model holds.
+It is a Kalman filter with a physics model of the table: drag, slope, wall bounces, and
+hits by paddles, whose paths are known. Every frame corrects it. The output is the
+prediction for now. It compensates latency, noise and short occlusions as far as the
+model is correct.
 """
 
 from __future__ import annotations
@@ -19,45 +20,47 @@ from marl_airhockey.sim.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 STEP = 0.01
-"""Longest step of a prediction, s"""
+"""Longest step of a prediction, s."""
 DRIFT = 0.5
 """Noise of the acceleration, m/s2, for errors of the model: unknown slopes and a
-calibration error that depends on the position. Like the next two, it has the least
-errors in juggle under the profile ur5e."""
+calibration error that depends on the position. This value and the next two give the
+smallest errors in juggle with the profile ur5e."""
 BOUNCE, HIT = 0.08, 0.10
-"""Noise of the velocity after a wall bounce and a hit, as share of the closing speed"""
+"""Noise of the velocity after a wall bounce and a hit, as a share of the closing
+speed."""
 FIRST = 0.02
-"""Standard deviation of the initial velocity, m/s"""
+"""Standard deviation of the initial velocity, m/s."""
 ABRUPT = 2.5
-"""Change of a velocity above which a second frame must confirm it, m/s"""
+"""Velocity change above which a second frame must confirm it, m/s."""
 STRANGE = 9.0
-"""Squared error, in variances of the prediction, above which an unmodelled event must
-have changed the velocity"""
+"""Squared error, in variances of the prediction, above which the filter assumes that an
+unmodelled event has changed the velocity."""
 
 PARAMETERS = (
     *("puck_damping", "puck_drag", "wall_restitution", "wall_restitution_slope"),
     *("wall_friction", "paddle_restitution", "paddle_friction"),
 )
-"""Names of the parameters that predictions use besides the slopes."""
+"""Names of the parameters that predictions use in addition to the slopes."""
 
 
 class Surroundings(NamedTuple):
     """Model of a table for predictions."""
 
     parameters: Array
-    """(9,) slope accelerations along x and y, m/s2, then `PARAMETERS`: range centres"""
+    """Centres of the ranges of the parameters (9,): accelerations by the slope along x
+    and y, m/s2, then `PARAMETERS`."""
     normals: Array
-    """(sides, 2) inward unit normals"""
+    """Inward unit normals of the sides (sides, 2)."""
     offsets: Array
-    """(sides,) distances from the origin, m"""
+    """Distances of the sides from the origin (sides,), m."""
     radius: float
-    """Radius of a puck, m"""
+    """Radius of a puck, m."""
     near: float
-    """Distance between the centres of a puck and a paddle in contact, m"""
+    """Distance between the centres of a puck and a paddle in contact, m."""
     noise: float
-    """Variance of a sensed position, m2"""
+    """Variance of a sensed position, m2."""
     control_dt: float
-    """Time of a control step, s"""
+    """Length of a control step, s."""
 
 
 class Estimator:
@@ -66,8 +69,8 @@ class Estimator:
     Args:
         scene: Table and bodies.
         worlds: Number of worlds, B.
-        physics: Ranges of the parameters, whose centres are used.
-        control_dt: Time of a control step, s.
+        physics: Ranges of the parameters. Their centres are used.
+        control_dt: Length of a control step, s.
     """
 
     def __init__(
@@ -76,7 +79,7 @@ class Estimator:
         middle = {name: sum(pair) / 2 for name, pair in physics.ranges.items()}
         tilts = np.radians([middle["tilt"], middle["cross_tilt"]])
         table, bodies = scene.table, scene.bodies
-        # Only changes of the calibration error within some frames disturb a velocity.
+        # Only changes of the calibration error within a few frames affect a velocity.
         noise = middle["position_noise"] ** 2 + (middle["calibration_error"] / 4) ** 2
         self._known = Surroundings(
             np.array(
@@ -91,25 +94,31 @@ class Estimator:
         )
         shape = worlds, bodies.pucks
         self._mean, self._spread = np.zeros((*shape, 5)), np.zeros((*shape, 3))
-        """At the last frame: x, y, vx, vy, speed of the edge; variance of the position,
-        covariance and variance of the velocity, the same along either axis"""
+        """Estimates at the last frame (x, y, vx, vy, speed of the edge), and their
+        variance of the position, covariance and variance of the velocity, which are
+        equal for both axes."""
         self._taken, self._doubted = np.zeros(shape), np.zeros(shape, np.bool_)
         self.now = np.zeros((*shape, 5))
-        """(B, pucks, 5) estimates for now: x, y, m, vx, vy, speed of the edge, m/s"""
+        """Estimates for now (B, pucks, 5): x and y, m; vx, vy and speed of the edge,
+        m/s."""
 
     @property
     def tracks(self) -> tuple[Array, Array]:
         """Estimates at the last frame of each puck.
 
-        Times (B, pucks), s; x, y, m, vx, vy, m/s, and speed of the edge, m/s, then,
-        (B, pucks, 5).
+        The first array contains the times of the frames (B, pucks), s. The second one
+        contains x and y, m, and vx, vy and speed of the edge, m/s (B, pucks, 5).
         """
         return self._taken, self._mean
 
     def reset(self, worlds: Array, seen: Array, velocity: Array, taken: Array) -> None:
-        """Reset worlds (W,) to pucks with some velocity.
+        """Reset the estimates of some worlds.
 
-        The pucks were ``seen`` (W, pucks, 2), m, at the times ``taken`` (W, pucks), s.
+        Args:
+            worlds: Indices (W,) of the worlds.
+            seen: Sensed positions (W, pucks, 2) of the pucks, m.
+            velocity: Velocities (W, pucks, 2) of the pucks, m/s.
+            taken: Times (W, pucks) of the sensed positions, s.
         """
         self._mean[worlds] = 0.0
         self._mean[worlds, :, :2], self._mean[worlds, :, 2:4] = seen, velocity
@@ -125,16 +134,16 @@ class Estimator:
         paddles: Array,
         now: Array,
     ) -> None:
-        """Correct the estimates of some worlds by a frame; predict them for now.
+        """Correct the estimates of some worlds by a frame and predict them for now.
 
         Args:
             worlds: Indices (W,) of the worlds.
-            seen: Positions (W, pucks and more, 2) in the frame, m.
+            seen: Sensed positions (W, n, 2) in the frame, pucks first, m.
             taken: Times (W,) of the frame, s.
-            fresh: (W, pucks and more) bool, True for what is visible in a new frame.
-            paddles: Paths (B, n, S, 2) of the paddles, a control step apart, the last
-                position that of now, m.
-            now: Times (B,) now, s.
+            fresh: True for bodies that are visible in a new frame (W, n), pucks first.
+            paddles: Positions (B, steps, S, 2) of the paddles at the last control
+                steps, up to now, m.
+            now: Current times (B,), s.
         """
         _update(
             *(worlds, seen, taken, fresh, paddles, now, self._known),
@@ -188,7 +197,7 @@ def _correct(
     if off > (ABRUPT * since) ** 2 and not doubted:
         return True
     if off > 2.0 * STRANGE * (spread[0] + noise):
-        # Assume a change of the velocity some time after the last frame.
+        # Assume that the velocity changed some time after the last frame.
         change = off / (since * since)
         spread[2] += change
         spread[1] += change * since
@@ -214,15 +223,16 @@ def _predict(
     now: float,
     known: Surroundings,
 ) -> None:
-    """Predict an estimate over some seconds, in place.
+    """Predict an estimate in place.
 
     Args:
-        mean: (5,) x, y, vx, vy, speed of the edge.
-        spread: (3,) variances and covariance.
+        mean: Estimate (5,): x and y, m; vx, vy and speed of the edge, m/s.
+        spread: Variance of the position, covariance and variance of the velocity (3,).
         begin: Time of the estimate, s.
-        seconds: Time of the prediction, s.
-        paddles: Positions (n, S, 2) at control steps, the last now, m.
-        now: Time now, s.
+        seconds: Duration of the prediction, s.
+        paddles: Positions (n, S, 2) of the paddles at the last control steps, up to
+            now, m.
+        now: Current time, s.
         known: Model of the table.
     """
     values, steps = known.parameters, int(np.ceil(seconds / STEP))
@@ -243,7 +253,7 @@ def _predict(
             if beyond < 0.0 and closing > 0.0:
                 e = wall_restitution(closing, values[4], values[5])
                 bounce(mean, nx, ny, closing, 0.0, e, values[6])
-                # The distance beyond the wall is covered again at the new speed.
+                # The puck covers the distance beyond the wall again at its new speed.
                 mean[0] -= (1.0 + e) * beyond * nx
                 mean[1] -= (1.0 + e) * beyond * ny
                 spread[2] += (BOUNCE * closing) ** 2
@@ -255,7 +265,7 @@ def _predict(
 def _meet(
     mean: Array, spread: Array, paddles: Array, back: float, known: Surroundings
 ) -> None:
-    """Apply contacts of a puck with the paddles of ``back`` control steps ago."""
+    """Apply contacts of a puck with the paddles, ``back`` control steps ago."""
     last = len(paddles) - 1
     new = max(last - int(back), 1)
     share = min(max(last - back - (new - 1), 0.0), 1.0)
@@ -270,7 +280,7 @@ def _meet(
         nx, ny = gx / gap, gy / gap
         wx, wy = wx / known.control_dt, wy / known.control_dt
         closing = nx * (wx - mean[2]) + ny * (wy - mean[3])
-        # The distance into the paddle is covered again, too.
+        # The puck covers the distance into the paddle again, too.
         back_out = known.near - gap
         if closing > 0.0:
             along = nx * wy - ny * wx

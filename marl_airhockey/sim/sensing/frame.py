@@ -1,4 +1,4 @@
-"""Frame of a simulated camera: where it sees the bodies of a world, compiled."""
+"""Frame of a simulated camera: sensed positions of the bodies of a world, compiled."""
 
 from __future__ import annotations
 
@@ -18,33 +18,34 @@ SAME_FRAME = 1e-4
 
 
 class CameraPast(NamedTuple):
-    """Past of B worlds and what a camera sees of it; n bodies are tracked."""
+    """Past of n tracked bodies in B worlds, and the last frames of their cameras."""
 
     past: Array
-    """(B, depth, n, 4) positions, m, and velocities, m/s, at control steps"""
+    """Positions, m, and velocities, m/s, at control steps (B, depth, n, 4)."""
     paddles: Array
-    """(B, steps, seats, 2) positions of the paddles at control steps, m"""
+    """Positions of the paddles at control steps (B, steps, seats, 2), m."""
     waves: Waves
-    """Calibration error"""
+    """Calibration error."""
     unhidden: Array
-    """(B, pucks) bool: pucks that no arm hides"""
+    """True for pucks that no arm hides (B, pucks)."""
     seen: Array
-    """(B, n, 4) sensed position, m, and velocity, m/s, in the last frame in which a
-    body was visible"""
+    """Sensed position, m, and velocity, m/s, in the last frame in which a body was
+    visible (B, n, 4)."""
     taken: Array
-    """(B, n) time of that frame, s"""
+    """Time of that frame (B, n), s."""
     visible: Array
-    """(B, pucks) bool: pucks that are seen in the newest frame, right or wrong"""
+    """True for pucks that are detected in the newest frame, at the right or at a wrong
+    position (B, pucks)."""
     bases: Array
-    """(seats, 2) positions of the arms, m"""
+    """Positions of the arms (seats, 2), m."""
     extent: Array
-    """(2,) largest x and y of the table, m"""
+    """Largest x and y of the table (2,), m."""
     control_dt: float
-    """Time of a control step, s"""
+    """Length of a control step, s."""
 
 
 class Errors(NamedTuple):
-    """Parameters of sensing in B worlds, (B,) each."""
+    """Parameters (B,) of sensing in B worlds."""
 
     observation_delay: Array
     observation_jitter: Array
@@ -57,21 +58,21 @@ class Newest(NamedTuple):
     """Newest frames of W worlds."""
 
     position: Array
-    """(W, n, 2) sensed positions, m"""
+    """Sensed positions (W, n, 2), m."""
     taken: Array
-    """(W,) time, s"""
+    """Times of the frames (W,), s."""
     fresh: Array
-    """(W, n) bool: bodies that are visible in it, for the first time"""
+    """True for bodies that are visible in a new frame (W, n)."""
 
     @staticmethod
     def empty(worlds: int, tracked: int) -> Newest:
-        """Return arrays that `take` fills."""
+        """Return arrays for `take` to fill."""
         fresh = np.empty((worlds, tracked), np.bool_)
         return Newest(np.empty((worlds, tracked, 2)), np.empty(worlds), fresh)
 
 
 def numbers(tracked: int, pucks: int) -> int:
-    """Return how many random numbers a frame takes."""
+    """Return the number of random numbers that a frame needs."""
     return 1 + 4 * tracked + 4 * pucks
 
 
@@ -90,10 +91,10 @@ def take(
 
     Args:
         worlds: Indices (W,) of the worlds.
-        units: (W, `numbers`) random numbers, uniform in [0, 1).
-        position: (B, N, 2) positions of paddles, pucks and blocks, m.
-        velocity: (B, N, 2) their velocities, m/s.
-        time: (B,) time now, s.
+        units: Random numbers (W, `numbers`), uniform in [0, 1).
+        position: Positions (B, N, 2) of paddles, pucks and blocks, m.
+        velocity: Velocities (B, N, 2) of paddles, pucks and blocks, m/s.
+        time: Current times (B,), s.
         errors: Parameters of sensing.
         view: Past and last frame.
         newest: Newest frame.
@@ -139,7 +140,7 @@ def _detect(
     newest: Newest,
     row: int,
 ) -> None:
-    """Hide a puck at x, y, or see it where it is not."""
+    """Hide a puck at x, y, or detect it at a wrong position."""
     pucks, share = view.visible.shape[1], errors.occlusion[w]
     visible = stays_visible(view.unhidden[w, k], share, view.control_dt, unit[k])
     near = near_arm(x, y, view.bases, view.paddles[w, -1])

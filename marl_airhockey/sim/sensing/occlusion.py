@@ -35,7 +35,7 @@ def near_arm(x: float, y: float, bases: Array, paddles: Array) -> bool:
         x: Position of the puck along x, m.
         y: Position of the puck along y, m.
         bases: Positions (seats, 2) of the arms, m.
-        paddles: Positions (seats, 2), m.
+        paddles: Positions (seats, 2) of the paddles, m.
     """
     for s in range(len(bases)):
         along_x, along_y = paddles[s] - bases[s]
@@ -55,9 +55,9 @@ def stays_visible(visible: bool, share: float, dt: float, unit: float) -> bool:
     """Sample whether a puck near an arm is visible now.
 
     Args:
-        visible: Whether it was a step ago.
+        visible: True if the puck was visible in the last step.
         share: Share of the time near an arm in which a puck is hidden.
-        dt: Time of a step, s.
+        dt: Length of a step, s.
         unit: Random number, uniform in [0, 1).
     """
     end = min(dt / SECONDS, 1.0)

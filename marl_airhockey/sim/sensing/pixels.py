@@ -1,4 +1,4 @@
-"""Pixel observations: small grey pictures of the table in a seat's ego frame."""
+"""Pixel observations: small grey images of the table in a seat's ego frame."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.types import Array
 
 SHIFT = 6
-"""Fractional bits of OpenCV's coordinates."""
+"""Number of fractional bits of OpenCV's coordinates."""
 
 
 def small_picture(
@@ -19,17 +19,17 @@ def small_picture(
     seat: int,
     size: int,
 ) -> Array:
-    """Draw the observation of a seat: (size, size) uint8 grey, ego frame.
+    """Render the observation of a seat: (size, size) uint8 grey, ego frame.
 
     Args:
         scene: Bodies on the table.
         position: Sensed positions (N, 2), table frame, m.
-        goal: Desired position (2,), or None.
+        goal: Desired position (2,), table frame, m, or None.
         rotation: Rotation (2, 2) from the table frame to the seat's ego frame.
-        seat: Index of the seat; its own paddle is the brighter one.
+        seat: Index of the seat. Its own paddle is brighter than the others.
         size: Width and height, pixels.
     """
-    # Imported here, as the rest of the package needs only numpy and numba.
+    # Imported here, because the rest of the package needs only numpy and numba.
     import cv2
 
     image = np.zeros((size, size), np.uint8)
@@ -58,13 +58,13 @@ def small_picture(
 def pictures_of(
     scene: Scene, frames: Array, goals: Array | None, seats: Array, size: int
 ) -> Array:
-    """Draw the observations of some seats of W worlds: (W, seats, size, size, F) uint8.
+    """Render observations of seats of W worlds: (W, seats, size, size, F) uint8.
 
     Args:
         scene: Bodies on the table.
         frames: Sensed positions (W, F, N, 2), table frame, newest last, m.
-        goals: Desired positions (W, 2), or None.
-        seats: Indices (n,) of seats.
+        goals: Desired positions (W, 2), table frame, m, or None.
+        seats: Indices (n,) of the seats.
         size: Width and height, pixels.
     """
     out = np.empty((len(frames), len(seats), size, size, frames.shape[1]), np.uint8)

@@ -1,4 +1,4 @@
-"""Reaction time: seats observe sensed states some control steps late."""
+"""Reaction time: latency of sensed states in whole control steps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from marl_airhockey.types import Array
 
 Parts = Mapping[str, Mapping[str, Any]]
-"""Arrays (B, ...) by part and name, such as the fields of a state; values that are not
+"""Arrays (B, ...) by part and name, such as the fields of a state. Values that are not
 arrays are constant and are not delayed."""
 
 
@@ -27,7 +27,7 @@ class ReactionDelay:
         self.steps = steps
         self._newest = 0
         self._past: dict[tuple[str, str], Array] = {}
-        """(steps + 1, B, ...) by part and name, in a ring"""
+        """Ring buffers (steps + 1, B, ...) by part and name."""
 
     def begin(self, worlds: Array, parts: Parts) -> None:
         """Begin an episode in some worlds, by index (W,)."""

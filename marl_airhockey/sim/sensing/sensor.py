@@ -17,35 +17,35 @@ from marl_airhockey.types import ALL, Array, Rows
 
 
 class Needs(NamedTuple):
-    """Requirements of some forms of observations beyond the sensed state."""
+    """Requirements of observation types beyond the sensed state."""
 
     history: bool
-    """The last sensed positions and requested actions."""
+    """True to store the last sensed positions and requested actions."""
     estimate: bool
-    """Estimates of the pucks for now, by a filter."""
+    """True to estimate the pucks for now by a filter."""
 
     @staticmethod
     def of(forms: Iterable[str]) -> Needs:
-        """Return the requirements of forms of observations, see `observable.OBSERVE`.
+        """Return the requirements of observation types, see `observable.OBSERVE`.
 
         Args:
-            forms: Names of the forms.
+            forms: Names of the observation types.
         """
         forms = set(forms)
         return Needs(bool(forms - {"velocity"}), "estimate" in forms)
 
 
 class Sensor:
-    """Sensor of B worlds, which turns states into sensed states and keeps a history.
+    """Sensor of B worlds, which converts states to sensed states and stores a history.
 
     Args:
         scene: Scene on the tables.
         num_worlds: Number of worlds, B.
         physics: Ranges of the parameters of sensing.
-        control_dt: Time of a step, s.
-        needs: Requirements of the observations.
-        sight: Newest measurement of a backend that senses itself, see
-            `Backend.sight`; None for a simulated camera.
+        control_dt: Length of a control step, s.
+        needs: Requirements of the observation types.
+        sight: Function that returns the newest measurement of a real table, see
+            `LiveBackend.sight`; None for simulated sensing.
     """
 
     def __init__(
@@ -65,13 +65,14 @@ class Sensor:
             self.camera = SimulatedCamera(*simulated)
         pucks, b = scene.bodies.pucks, num_worlds
         self.history = np.zeros((b, HISTORY, pucks, 4))
-        """(B, HISTORY, pucks, 4) sensed x, y, m, visibility and age, s, newest last."""
+        """Sensed x and y, m, visibility, and age, s, of the pucks
+        (B, HISTORY, pucks, 4), newest last."""
         self.age = np.zeros((b, pucks))
-        """(B, pucks) age of the simulated camera's newest frame of each puck, s."""
+        """Age of the simulated camera's newest frame of each puck (B, pucks), s."""
         self.frames = np.zeros((b, FRAMES, len(scene.bodies), 2))
-        """(B, FRAMES, N, 2) sensed positions of all bodies, m, newest last."""
+        """Sensed positions of all bodies (B, FRAMES, N, 2), m, newest last."""
         self.requested = np.zeros((b, PENDING, scene.bodies.paddles, 2))
-        """(B, PENDING, seats, 2) last requested actions, ego frames, newest last."""
+        """Last requested actions (B, PENDING, seats, 2), ego frames, newest last."""
 
     @property
     def ideal(self) -> bool:
@@ -87,7 +88,7 @@ class Sensor:
         return sensed if self.camera is None else self.camera.estimated(sensed)
 
     def best(self, sensed: State) -> State:
-        """Return a sensed state with estimates, if there are any."""
+        """Return a sensed state with estimates, if they are computed."""
         estimates = self.camera is not None and self.camera.estimates
         return self.estimated(sensed) if estimates else sensed
 
@@ -104,7 +105,7 @@ class Sensor:
         values: Mapping[str, Array],
         streams: StreamSet,
     ) -> State:
-        """Begin an episode in some worlds; return the sensed state, see `reset`."""
+        """Begin an episode in some worlds and return the sensed state, see `reset`."""
         self.requested[worlds] = 0.0
         if self.camera is not None:
             self.camera.begin(worlds, values, streams)
@@ -117,15 +118,15 @@ class Sensor:
         values: Mapping[str, Array],
         streams: StreamSet,
     ) -> State:
-        """Forget the past in some worlds; return the sensed state.
+        """Replace the past in some worlds and return the sensed state.
 
-        The past becomes that of bodies that have moved at their velocities.
+        The new past is that of bodies that moved at constant velocity.
 
         Args:
             worlds: Indices (W,) of the worlds.
             state: State of all B worlds.
-            values: Physical parameters by name, (B,) each.
-            streams: Streams of the worlds, "sensor" among them.
+            values: Physical parameters (B,) by name.
+            streams: Random streams of the worlds, including "sensor".
         """
         if self.camera is not None:
             self.camera.reset(worlds, state, values)
@@ -142,7 +143,7 @@ class Sensor:
         streams: StreamSet,
         rows: Rows = ALL,
     ) -> State:
-        """Return the sensed state; time has passed in the worlds ``rows`` alone."""
+        """Return the sensed state. Time has passed only in the worlds ``rows``."""
         sensed = state
         if self.camera is not None:
             sensed, self.age = self.camera.look(state, values, streams, rows)

@@ -25,26 +25,27 @@ SENSED = (
 )
 """Names of the physical parameters of sensing."""
 PAST = 0.4
-"""Time for which the paths of paddles are stored, s"""
+"""Time for which the paths of paddles are stored, s."""
 
 
 class SimulatedCamera:
     """Camera over the tables of B worlds.
 
-    At every step it delivers its newest frame, whose age is the latency of the episode
-    and a jitter of the step. A position has a smooth error, fixed for the episode, and
-    white noise. A puck near an arm may be hidden: it keeps the position and velocity of
-    the last frame in which it was visible. Rarely a puck is detected where it is not.
-    A velocity is the difference between the last two frames in which a body was
-    visible, over the time between them. Paddles are not seen: robots report them.
-    Contacts of pucks with paddles are found in the frames, so they are known late.
+    In every step it returns its newest frame. The age of the frame is the latency of
+    the episode plus a jitter of the step. A position has white noise and a smooth error
+    that is constant in an episode. A puck near an arm may be hidden. It keeps the
+    position and velocity of the last frame in which it was visible. Rarely a puck is
+    detected at a wrong position. A velocity is the difference between the last two
+    frames in which a body was visible, divided by the time between them. Paddles are
+    not observed by the camera, because robots report them. Contacts of pucks with
+    paddles are detected in the frames and have their latency.
 
     Args:
         scene: Scene on the tables.
         num_worlds: Number of worlds, B.
         physics: Ranges of the parameters of sensing.
-        control_dt: Time of a step, s.
-        estimates: Whether a filter estimates the pucks as well.
+        control_dt: Length of a control step, s.
+        estimates: True to also estimate the pucks by a filter.
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class SimulatedCamera:
     ) -> None:
         bodies, table, b = scene.bodies, scene.table, num_worlds
         self.tracked = slice(bodies.paddles, bodies.movers)
-        """Indices of the bodies that it sees: pucks and blocks."""
+        """Indices of the bodies that the camera observes: pucks and blocks."""
         self.pucks, self._puck_radius = bodies.pucks, table.puck_radius
         n = self.tracked.stop - self.tracked.start
         longest = physics.highest("observation_delay")
@@ -85,12 +86,12 @@ class SimulatedCamera:
     def begin(
         self, worlds: Array, values: Mapping[str, Array], streams: StreamSet
     ) -> None:
-        """Sample what is fixed for an episode in some worlds; call `reset` after it.
+        """Sample the constants of an episode in some worlds; call `reset` afterwards.
 
         Args:
             worlds: Indices (W,) of the worlds.
-            values: Physical parameters by name, (B,) each.
-            streams: Streams of the worlds, "sensor" among them.
+            values: Physical parameters (B,) by name.
+            streams: Random streams of the worlds, including "sensor".
         """
         sd = values["calibration_error"][worlds]
         self.calibration.sample(streams.of("sensor", worlds), sd, worlds)
@@ -101,7 +102,7 @@ class SimulatedCamera:
         Args:
             worlds: Indices (W,) of the worlds.
             state: State of all B worlds.
-            values: Physical parameters by name, (B,) each.
+            values: Physical parameters (B,) by name.
         """
         position = state.position[worlds, self.tracked]
         velocity, view = state.velocity[worlds, self.tracked], self._view
@@ -127,7 +128,7 @@ class SimulatedCamera:
 
     @property
     def _tracks(self) -> tuple[Array, Array]:
-        """Times of the bodies' last frames and positions and velocities in them."""
+        """Times of the last frames of the bodies; positions and velocities in them."""
         if self._estimator is not None:
             return self._estimator.tracks
         return self._view.taken, self._view.seen
@@ -139,18 +140,17 @@ class SimulatedCamera:
         streams: StreamSet,
         rows: Rows = ALL,
     ) -> tuple[State, Array]:
-        """Return the sensed state of all worlds; time has passed in ``rows`` alone.
+        """Return the sensed state of all worlds. Time has passed only in ``rows``.
 
         Returns:
-            The state as the camera sees it, and the ages of the pucks' positions,
-            (B, pucks), s.
+            The sensed state, and the ages of the pucks' positions (B, pucks), s.
         """
         self._update(state, values, streams, rows)
         view, position = self._view, state.position.copy()
         velocity = state.velocity.copy()
         position[:, self.tracked] = view.seen[..., :2]
         velocity[:, self.tracked] = view.seen[..., 2:]
-        # A camera sees the centre of a puck, not its spin.
+        # A camera detects the centre of a puck, but not its spin.
         spin = state.spin.copy()
         spin[:, self.tracked] = 0.0
         visible = state.visible & view.visible
@@ -171,10 +171,10 @@ class SimulatedCamera:
         """Return a sensed state with the estimates of the pucks for now.
 
         Raises:
-            RuntimeError: It was made without ``estimates``.
+            RuntimeError: The camera was created without ``estimates``.
         """
         if self._estimator is None:
-            raise RuntimeError("pucks are not estimated; make it with estimates=True")
+            raise RuntimeError("pucks are not estimated: create it with estimates=True")
         found, puck = self._estimator.now, sensed.bodies.puck
         position, velocity = sensed.position.copy(), sensed.velocity.copy()
         spin = sensed.spin.copy()
@@ -189,7 +189,7 @@ class SimulatedCamera:
         streams: StreamSet,
         rows: Rows,
     ) -> None:
-        """Update what is seen in some worlds by a frame."""
+        """Update the sensed bodies in some worlds by a frame."""
         view, worlds, now = self._view, self._all[rows], state.time
         w, n = len(worlds), view.seen.shape[1]
         units = streams.of("sensor", worlds).units(frame.numbers(n, self.pucks))

@@ -1,1 +1,1 @@
-"""Worlds: one control step of B of them, from actions to rewards."""
+"""Worlds: control steps of B worlds, from actions to rewards and observations."""

@@ -18,36 +18,36 @@ from marl_airhockey.types import Array
 
 
 class Inputs(NamedTuple):
-    """Inputs of a control step; preallocated arrays, overwritten at every step."""
+    """Inputs of a control step; preallocated arrays, overwritten in every step."""
 
     action: Array
-    """(B, seats, 2) actions after their delay: fractions of top speed, ego frames"""
+    """Actions after their latency (B, seats, 2), in units of top speed, ego frames."""
     prescribed: Array
-    """(B, seats, 4) position, m, and velocity, m/s, of position-driven paddles, table
-    frame; nan for all others"""
+    """Positions, m, and velocities, m/s, of position-driven paddles (B, seats, 4),
+    table frame; nan for all others."""
     closed: Array
-    """(B, goal_lines) bool: goal lines that are wall"""
+    """True for goal lines that are wall (B, goal_lines)."""
     raised: Array
-    """(B, seats) bool: paddles that are held above the table and touch nothing"""
+    """True for paddles above the table, which touch nothing (B, seats)."""
 
     @staticmethod
     def empty(scene: Scene, worlds: int) -> Inputs:
-        """Return inputs of paddles at rest, freshly allocated."""
+        """Return inputs of paddles at rest, in new arrays."""
         still = Command.still(scene, worlds)
         action = np.zeros((worlds, len(scene.seats), 2))
         return Inputs(action, still.prescribed, still.closed, still.raised)
 
 
 class Actions:
-    """Collector of the actions of B worlds, which delays them by the physics.
+    """Collector of the actions of B worlds, which applies the action latency.
 
     Args:
-        scenario: Scenario, which says which seats are eliminated.
+        scenario: Scenario, which defines the eliminated seats.
         driven: Seats with drivers inside the environment.
-        open_seats: Indices (open,) of the other seats.
-        physics: Ranges of the action latency.
+        open_seats: Indices of the open seats (open,).
+        physics: Ranges of the physics parameters, for the action latency.
         worlds: Number of worlds, B.
-        control_dt: Time of a step, s.
+        control_dt: Length of a control step, s.
     """
 
     def __init__(
@@ -65,31 +65,32 @@ class Actions:
         self._elimination = _Elimination(scene)
         self._shape = (worlds, len(open_seats), 2)
         self.inputs = Inputs.empty(scene, worlds)
-        """Inputs of the step, as `collect` leaves them."""
+        """Inputs of the step, which `collect` fills."""
         shape = self.inputs.action.shape
         self._delay = Delay(longest, control_dt, shape) if longest else None
         self._positioned = False
         """True if the last step had position-driven paddles or closed goals."""
 
     def reset(self, worlds: Array) -> None:
-        """Forget the actions that are under way in some worlds, by index."""
+        """Discard the delayed actions of some worlds, by index (W,)."""
         if self._delay is not None:
             self._delay.fill(worlds, 0.0)
 
     def collect(self, actions: Array, prescribed: Array | None, known: Known) -> Array:
-        """Fill `inputs`; return the requested actions (B, seats, 2), before any delay.
+        """Fill `inputs`; return the actions (B, seats, 2) before their latency.
 
         Args:
-            actions: Actions (B, open, 2) of the open seats.
-            prescribed: Positions and velocities (B, open, 4) of paddles of open seats,
-                nan for those that request an action; None if all do.
-            known: What seats know before the step.
+            actions: Actions of the open seats (B, open, 2).
+            prescribed: Positions and velocities of position-driven paddles of open
+                seats (B, open, 4), ego frames, m and m/s; nan for seats with actions.
+                None if all seats have actions.
+            known: Knowledge of the seats before the step.
 
         Raises:
-            ValueError: A wrong shape, or a paddle prescribed at infinity.
+            ValueError: A shape is wrong, or an element of ``prescribed`` is infinite.
         """
         if prescribed is not None and np.isinf(prescribed).any():
-            raise ValueError("prescribed: no element may be infinite")
+            raise ValueError("position-driven seat: no element may be infinite")
         if actions.shape != self._shape:
             raise ValueError(
                 f"actions: expected shape {self._shape}, got {actions.shape}"
@@ -124,10 +125,10 @@ class Actions:
         return requested
 
     def _position(self, k: int, measured: Array, acts: bool = False) -> None:
-        """Put a seat's paddle where it was measured, (B, 4), ego frame.
+        """Move a seat's paddle to its measured position and velocity (B, 4), ego frame.
 
-        Worlds whose row is nan keep the requested action; in all others it is 0, unless
-        the driver has commanded its device with it: ``acts``.
+        Worlds with a row of nan keep the requested action. In all others the action is
+        0, unless the driver has commanded its device with it (``acts``).
         """
         self._positioned = True
         action, prescribed = self.inputs.action, self.inputs.prescribed
@@ -139,7 +140,7 @@ class Actions:
 
 
 class _Elimination:
-    """Positions of eliminated paddles, behind their sides, and their goal lines."""
+    """Positions of eliminated paddles behind their sides, and their goal lines."""
 
     def __init__(self, scene: Scene) -> None:
         table, sides = scene.table, [seat.side for seat in scene.seats]

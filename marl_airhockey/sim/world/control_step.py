@@ -29,25 +29,25 @@ class Moment(NamedTuple):
 
     state: State
     commanded: Limited
-    """Commands that the limits passed, and by how much the actions exceeded them"""
+    """Commands after the limits, and the excess of the actions over the limits."""
     realized: Limited
-    """Commands that the paddles follow: the same, or a servo's response to them"""
+    """Commands that the paddles follow: ``commanded``, or the response of a servo."""
     rate: Array
-    """Acceleration of the servos (B, S, 2), m/s2"""
+    """Acceleration of the servos (B, S, 2), table frame, m/s2."""
     verdict: Verdict
     episode: EpisodeCounters
-    """Counters, those of the verdict among them"""
+    """Counters of the episodes, including the counters of the verdict."""
     shown: Sink
-    """Observations of all seats from the true state, see `Observer.stage`"""
+    """Observations of all seats from the true state, see `Observer.stage`."""
 
     def write(self, worlds: Array, rows: State, memory: Memory) -> None:
-        """Copy rows of a state and a memory into some worlds, by index."""
+        """Copy rows of a state and a memory into some worlds, by index (W,)."""
         self.state.write(worlds, rows)
         for name, row in memory.items():
             self.verdict.memory[name][worlds] = row
 
     def begin(self, worlds: Array) -> None:
-        """Reset the counters in some worlds, by index; paddles accelerate from 0."""
+        """Reset counters and accelerations of some worlds, by index (W,)."""
         counts = (*self.episode.running, self.realized.acceleration)
         clear_rows(worlds, tuple(x.reshape(len(x), -1) for x in counts))
         self.commanded.velocity[worlds] = self.state.paddle_velocity[worlds]
@@ -57,24 +57,24 @@ class Moment(NamedTuple):
 class ControlStep:
     """Control step of B worlds, from actions to rewards.
 
-    There are two moments, before and after, which swap roles at every step: what one
-    holds is overwritten by the step after the next. Rules and observations are compiled
-    when it is built. Copies and pickles hold the arrays and compile nothing again.
+    Two moments, before and after the step, swap their roles in every step. The step
+    after the next overwrites the arrays of a moment. The constructor compiles rules and
+    observations. Copies and pickles contain the arrays and compile nothing again.
 
     Args:
         inputs: Inputs of every step, used by reference.
-        backend: Physics.
-        referee: Rules.
-        observer: Observations.
-        reach: Reach of the seats.
-        limit: Control steps (B,) after which the clock ends an episode.
+        backend: Backend of the worlds.
+        referee: Referee, which applies the rules.
+        observer: Observer, which computes the observations.
+        reach: Workspaces of the seats.
+        limit: Number of control steps after which an episode is truncated (B,).
         episode: Counters of all worlds, used by reference.
-        state: State of all worlds at the beginning.
-        memory: Memory of all worlds at the beginning.
-        lags: Whether paddles follow their commands as a servo does.
+        state: Initial state of all worlds.
+        memory: Initial memory of all worlds.
+        lags: True if paddles follow their commands with the lag of a servo.
 
     Raises:
-        ValueError: A memory whose arrays change their type or shape in a step, named.
+        ValueError: An array of the memory changes its type or shape in a step.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class ControlStep:
         self._observer, self._reach, self._limit = observer, reach, limit
         self._name, self._lags = referee.scenario.name, lags
         self._response = np.zeros_like(inputs.action)
-        """(B, seats, 2) responses of the servos to the commands, as actions"""
+        """Responses of the servos to the commands, as actions (B, seats, 2)."""
         self._moments = tuple(self._moment(state, memory, episode) for _ in range(2))
         self._now = 0
         self._pipelines: list[Pipeline] = []
@@ -105,14 +105,14 @@ class ControlStep:
 
     @property
     def now(self) -> Moment:
-        """Moment at which the worlds are."""
+        """Current moment of the worlds."""
         return self._moments[self._now]
 
     def __call__(self) -> Moment:
         """Move all worlds by a step and return the moment after it.
 
         Raises:
-            ValueError: an action that is not finite.
+            ValueError: An action is not finite.
         """
         if not self._pipelines:
             self._compile()
@@ -122,7 +122,7 @@ class ControlStep:
         return self._moments[self._now]
 
     def _moment(self, state: State, memory: Memory, episode: EpisodeCounters) -> Moment:
-        """Return a moment with arrays of its own, filled as by a step of no time."""
+        """Return a moment with new arrays, filled as by a step of zero length."""
         here, b = self._backend.empty_state(), len(self._limit)
         here.write(np.arange(b), state)
         realized = Limited.empty(b, len(self._reach.share))
@@ -148,7 +148,7 @@ class ControlStep:
         action, prescribed = self._inputs.action, self._inputs.prescribed
         top, reach = physics["paddle_speed"], self._reach
         shared = reach, (top, physics["paddle_acceleration"]), self._backend.control_dt
-        # Measured velocities come late: there the last command is taken instead.
+        # On a real table the velocity is delayed, so the last command replaces it.
         last = state.velocity
         if isinstance(self._backend, LiveBackend):
             last = before.realized.velocity
@@ -167,7 +167,7 @@ class ControlStep:
             self._backend.control_dt,
             self._response,
         )
-        # Twice, as what lags must stay within the reach as well.
+        # The limits apply twice, as the response must stay in the workspace as well.
         return [
             limits_stage(action, prescribed, commanded, *shared, new),
             servo,
@@ -191,7 +191,7 @@ class ControlStep:
 
 
 def _check_memory(old: Memory, new: Memory) -> None:
-    """Refuse a memory that is not of the same kind after a step."""
+    """Check that a step changes no type and no shape of a memory."""
     for name in old.keys() | new.keys():
         kinds = [
             f"{m[name].dtype} {m[name].shape}" if name in m else "nothing"
@@ -199,6 +199,6 @@ def _check_memory(old: Memory, new: Memory) -> None:
         ]
         if kinds[0] != kinds[1]:
             raise ValueError(
-                f"memory {name!r}: it begins as {kinds[0]} and is {kinds[1]} after a "
-                "step; let `initial_memory` give what `update_memory` gives"
+                f"memory {name!r}: `initial_memory` returns {kinds[0]}, and a step "
+                f"returns {kinds[1]}; both must be equal"
             )

@@ -1,4 +1,4 @@
-"""Driven seat: a seat that is controlled by a driver inside the environment."""
+"""Driven seat: a seat that a driver inside the environment controls."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from marl_airhockey.types import ALL, Array, Rows
 
 
 class DrivenSeat:
-    """Seat of B worlds that is controlled by a driver, with the driver's memory.
+    """Seat of B worlds that a driver controls, with the memory of the driver.
 
     Args:
         index: Index of the seat.
         driver: Driver, which is entered as a context manager.
         observer: Observer of the worlds.
         num_worlds: Number of worlds, B.
-        control_dt: Time of a step, s.
+        control_dt: Length of a control step, s.
 
     Raises:
-        ValueError: A driver whose control_dt is no multiple of the environment's, or
-            which cannot act on its observations.
+        ValueError: The driver's ``control_dt`` is no multiple of the control step, or
+            the driver cannot act on its observations.
     """
 
     def __init__(
@@ -75,15 +75,15 @@ class DrivenSeat:
 
     @property
     def acts(self) -> bool:
-        """True if `act` is to be called: for an action, or to command a device."""
+        """True if `act` must be called, for an action or to command a device."""
         return self.driver.commands_device or self.driver.measured() is None
 
     def measured(self) -> Array | None:
-        """Return (B, 4) the measured paddle, if the driver is position-driven."""
+        """Return the measured paddle (B, 4), ego frame; None if it follows actions."""
         return self.driver.measured()
 
     def act(self, known: Known, worlds: Rows = ALL) -> Array:
-        """Return the actions in some worlds, (W, 2) fractions in the ego frame."""
+        """Return actions in some worlds (W, 2), in units of top speed, ego frame."""
         due, held = known.cycles[worlds] % self.every == 0, self._held[worlds]
         if not due.any():
             return held
@@ -109,7 +109,7 @@ class DrivenSeat:
         return self._held[worlds]
 
     def view(self, known: Known, worlds: Rows = ALL) -> View:
-        """Return the view of the driver in some worlds; arrays are of all of them."""
+        """Return the view of the driver in some worlds, with one row for each world."""
         sensed = known.sensed
 
         def read() -> Observation:

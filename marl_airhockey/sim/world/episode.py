@@ -1,4 +1,4 @@
-"""Episode: the counters of running episodes."""
+"""Episode: counters of the running episodes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from marl_airhockey.types import Array
 
 
 class PhysicsRows(Mapping[str, Array]):
-    """Parameters of some worlds: those of all by name, of which rows are taken."""
+    """Physics parameters of some worlds, which are rows of the parameters of all."""
 
     def __init__(self, physics: Mapping[str, Array], worlds: Array) -> None:
         self._physics, self._worlds = physics, worlds
@@ -30,24 +30,24 @@ class PhysicsRows(Mapping[str, Array]):
 
 @dataclass(frozen=True)
 class EpisodeCounters:
-    """Counters of the running episodes, (B, ...) each."""
+    """Counters of the running episodes, arrays (B, ...)."""
 
     number: Array
-    """Episodes begun since the last seed"""
+    """Number of episodes begun since the last seed (B,)."""
     cycles: Array
-    """Control steps taken"""
+    """Number of control steps in the episode (B,)."""
     returns: Array
-    """(B, seats) sum of rewards"""
+    """Sum of rewards in the episode (B, seats)."""
     success: Array
-    """(B, seats) latched"""
+    """True if the episode has been a success (B, seats)."""
     first_shot: Array
-    """(B,) latched"""
+    """True if it has been a success before a second distinct touch (B,)."""
     physics: dict[str, Array]
-    """Physical parameters, (B,) each"""
+    """Physics parameters by name (B,)."""
 
     @staticmethod
     def empty(worlds: int, seats: int) -> EpisodeCounters:
-        """Return counters at zero, of no episode yet."""
+        """Return counters before the first episode, all 0."""
         return EpisodeCounters(
             number=np.zeros(worlds, np.int64),
             cycles=np.zeros(worlds, np.int64),
@@ -58,23 +58,23 @@ class EpisodeCounters:
         )
 
     def counted(self, counters: dict[str, Array]) -> EpisodeCounters:
-        """Return the same with other arrays for some counters."""
+        """Return a copy with other arrays for some counters."""
         return replace(self, **counters)  # type: ignore[arg-type]
 
     def copied(self) -> EpisodeCounters:
-        """Return the same with arrays of its own, but for the physics."""
+        """Return a copy with new arrays, except for the physics."""
         names = [f.name for f in fields(self) if f.name != "physics"]
         return self.counted({name: getattr(self, name).copy() for name in names})
 
     def draw_physics(
         self, physics: Physics, stream: RandomStreams, worlds: Array
     ) -> Array:
-        """Draw the physics of new episodes; return the worlds in which it is new.
+        """Sample the physics of new episodes; return the worlds in which it changed.
 
         Args:
-            physics: parameters and their ranges.
-            stream: of all worlds.
-            worlds: (W,) indices of those that begin an episode.
+            physics: Parameters and their ranges.
+            stream: Random streams of all worlds.
+            worlds: Indices of the worlds that begin an episode (W,).
         """
         if not self.physics:
             self.physics.update(physics.draw(stream))
@@ -87,5 +87,5 @@ class EpisodeCounters:
 
     @property
     def running(self) -> tuple[Array, ...]:
-        """Counters that begin at 0 with every episode."""
+        """Counters that begin at 0 in every episode."""
         return self.cycles, self.returns, self.success, self.first_shot

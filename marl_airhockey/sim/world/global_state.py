@@ -1,4 +1,4 @@
-"""Global state: what a critic of all seats may know of a world, as flat numbers."""
+"""Global state: the true state of a world as a flat array, for a critic."""
 
 from __future__ import annotations
 
@@ -16,19 +16,24 @@ if TYPE_CHECKING:
     from marl_airhockey.sim.world.world import World
 
 MOST = 10.0
-"""Bound of the numbers in the scenario's memory: infinity (never) is shown as this."""
+"""Bound of the elements of the memory, which also represents "never" (inf)."""
 
 
 class GlobalState:
-    """True state of everything in a world, table frame.
+    """True state of a world, table frame.
 
-    What happens next follows from it, the actions and the physics of the episode:
-    x, y, vx, vy of all that moves (m, m/s), the spin of pucks (m/s at the edge), the
-    turn of square blocks (rad, within a quarter), the scenario's memory (lives, goals,
-    who touched last), each number within -10 .. 10, and the share of the time gone.
+    The state, the actions and the physics of the episode determine the next state. The
+    elements are, in this order:
+
+    - x, y, vx, vy of all bodies that move, m and m/s,
+    - spin of pucks, as the speed of their edges, m/s,
+    - rotation of square blocks, modulo a quarter turn, rad,
+    - memory of the scenario, such as lives, goals and the last toucher, clipped to
+      -10 .. 10,
+    - share of the time limit that has passed.
 
     Args:
-        world: may not be reset yet.
+        world: Worlds, before or after their first reset.
     """
 
     def __init__(self, world: World) -> None:
@@ -39,13 +44,13 @@ class GlobalState:
         self._rotating = scene.bodies.blocks if scene.block_shape == "square" else 0
         self._bound = self._bounds()
         self.labels = tuple(self._names())
-        """Name of each number."""
+        """Name of each element."""
         low, high = -self._bound, self._bound.copy()
         low[-1] = 0.0
         self.space = spaces.Box(low, high, dtype=np.float32)
 
     def _bounds(self) -> Array:
-        """Return bounds of all numbers; a puck out of play lies behind a goal."""
+        """Return bounds of all elements; a puck out of play is behind a goal."""
         scene, pucks = self._world.scene, self._world.scene.bodies.pucks
         motion = np.full((scene.bodies.movers, 4), PUCK_SPEED_CAP)
         motion[:, :2] = np.abs(np.asarray(scene.table.vertices)).max(0) + 0.25
@@ -71,7 +76,7 @@ class GlobalState:
         yield "time_share"
 
     def read(self) -> Array:
-        """Return (B, n) float32, freshly allocated."""
+        """Return the states (B, n), float32, in a new array."""
         world, bodies = self._world, self._world.scene.bodies
         state, memory = world.get_state()
         b, first = world.num_worlds, bodies.movers - self._rotating

@@ -16,31 +16,31 @@ OTHER_NAMES = {
     **dict.fromkeys(("max_episode_steps", "max_steps", "horizon"), "max_cycles"),
     **dict.fromkeys(("camera", "camera_name"), "viewpoint"),
 }
-"""Names of keywords in other libraries, with ours"""
+"""Keyword of this library for names that other libraries use."""
 
 
 KINDS: dict[str, tuple[str, type | tuple[type, ...]]] = {
-    "backend": ("name of a backend", str),
-    "drivers": ("dict of drivers by agent", Mapping),
-    "seats": ("kind of seats", str),
-    "profile": ("name or file of a profile", (str, Path)),
-    "observe": ("type of observations", str),
+    "backend": ("the name of a backend", str),
+    "drivers": ("a dict of drivers by agent", Mapping),
+    "seats": ("a kind of seats", str),
+    "profile": ("the name or file of a profile", (str, Path)),
+    "observe": ("an observation type", str),
     "goals": ('"flat" or "dict"', str),
     "physics": (
-        "preset, TOML file or dict of parameters",
+        "a preset, a TOML file or a dict of parameters",
         (str, Path, Mapping, NoneType),
     ),
-    "control_dt": ("time in seconds", Real),
-    "substeps": ("whole number above 0", (Integral, NoneType)),
-    "max_cycles": ("whole number above 0", (Integral, NoneType)),
-    "options": ("dict of fields of the scenario", Mapping),
-    "rig": ("file of a rig", (str, Path)),
+    "control_dt": ("a time in seconds", Real),
+    "substeps": ("a whole number above 0", (Integral, NoneType)),
+    "max_cycles": ("a whole number above 0", (Integral, NoneType)),
+    "options": ("a dict of fields of the scenario", Mapping),
+    "rig": ("the file of a rig", (str, Path)),
 }
-"""What a keyword is, and its types"""
+"""Description of each keyword for messages, and its types."""
 
 
 class Keywords(TypedDict, total=False):
-    """Keywords of every environment; see `build_world` for meanings."""
+    """Keywords that all environments share; `make.parallel_env` explains them."""
 
     backend: str
     drivers: Mapping[str, Any]
@@ -57,23 +57,22 @@ class Keywords(TypedDict, total=False):
 
 
 def check_keywords(keywords: Mapping[str, Any]) -> None:
-    """Refuse keywords that no environment has, and values of another type.
+    """Check the names of keywords and the types of their values.
 
     Raises:
-        UnknownKeywordError: An unknown keyword, with the one that was meant.
-        ValueError: A value of another type.
+        UnknownKeywordError: A keyword is unknown; the message suggests a known one.
+        ValueError: A value has a wrong type.
     """
     for name, value in keywords.items():
         if name in OTHER_NAMES:
             raise UnknownKeywordError(
-                f"unexpected keyword argument {name!r}; here it is "
-                f"{OTHER_NAMES[name]!r}"
+                f"unexpected keyword argument {name!r}; use {OTHER_NAMES[name]!r}"
             )
         if name not in Keywords.__annotations__:
             raise UnknownKeywordError(
                 unknown_keyword(name, Keywords.__annotations__)
-                + "; fields of the scenario go into options={...}"
+                + "; set fields of the scenario with options={...}"
             )
         what, kinds = KINDS[name]
         if isinstance(value, bool) or not isinstance(value, kinds):
-            raise ValueError(f"{name}: {value!r} is no {what}")
+            raise ValueError(f"{name}: {value!r} is not {what}")

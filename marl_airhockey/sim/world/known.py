@@ -1,4 +1,4 @@
-"""Known: what seats know at a moment, from which their actions follow."""
+"""Known: the knowledge of all seats, from which drivers compute actions."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from marl_airhockey.types import Array, Memory
 
 
 class Known(NamedTuple):
-    """What the seats of B worlds know at a moment, see `World.known`.
+    """Knowledge of the seats of B worlds at a moment, see `World.known`.
 
-    All that chooses actions takes this object, so that a driver observes the same in an
-    environment, in a game of many, in a browser and in an evaluation.
+    Environments, rosters, the browser page and evaluations pass this object to drivers,
+    so that a driver observes the same in all of them.
     """
 
     sensed: State
-    """Sensed state, table frame"""
+    """Sensed state, table frame."""
     memory: Memory
-    """Memory of the scenario as it follows from what is sensed, (B, ...) each"""
+    """Memory of the scenario, computed from sensed states, arrays (B, ...)."""
     physics: dict[str, Array]
-    """Physical parameters of the running episodes, (B,) each"""
+    """Physics parameters of the running episodes by name (B,)."""
     cycles: Array
-    """(B,) control steps since the episodes began"""
+    """Number of control steps since the episodes began (B,)."""
 
     def copied(self) -> Known:
-        """Return the same with arrays of its own, but for the physics."""
+        """Return a copy with new arrays, except for the physics."""
         memory = {name: array.copy() for name, array in self.memory.items()}
         sensed, cycles = self.sensed.map(np.copy), self.cycles.copy()
         return Known(sensed, memory, self.physics, cycles)

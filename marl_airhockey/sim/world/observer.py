@@ -1,4 +1,4 @@
-"""Observer: observations of all seats, as arrays, dicts of goals, or pictures."""
+"""Observer: observations of all seats as arrays, dicts with goals, or images."""
 
 from __future__ import annotations
 
@@ -26,31 +26,30 @@ from marl_airhockey.sim.sensing.sensor import Sensor
 from marl_airhockey.types import ALL, Array, Memory, Rows
 
 Observation = Array | Mapping[str, Array]
-"""(B, seats, D) float32, (B, seats, 84, 84, 3) uint8, or a dict of goals."""
+"""Array (B, seats, D) float32 or (B, seats, 84, 84, 3) uint8, or dict with goals."""
 PIXELS = 84
 GOALS = ("achieved_goal", "desired_goal")
 
 
 class Observer:
-    """Observer of sensed states, for all seats and in several forms.
+    """Observer of all seats, with several observation types.
 
-    An observation is made in one of two ways: `stage` fills arrays from the true state
-    as part of the control step, where that is all that seats observe; `read` returns
-    any form for any seats and worlds.
+    If seats observe the true state, `stage` fills arrays as part of the control step.
+    `read` returns any observation type for any seats and worlds.
 
-    With a reaction time, all but a seat's own paddle is observed with this latency;
-    `begin` and `note` must be called with what is sensed.
+    With a reaction time, a seat observes its own paddle immediately and everything else
+    with this latency. `begin` and `note` must then be called with the sensed states.
 
     Args:
-        scenario: Scenario, which lists the observables and has the reaction time.
-        sensor: Sensor, which keeps the history.
-        physics: Ranges of the top speed.
-        forms: Forms of observations that can be read, see `observable.OBSERVE`; the
-            first one is that of the open seats.
+        scenario: Scenario, which defines observables and reaction time.
+        sensor: Sensor, which stores the history.
+        physics: Ranges of the physics parameters, for the top speed.
+        forms: Observation types that can be read, see `observable.OBSERVE`. The first
+            one is the type of the open seats.
 
     Raises:
-        ValueError: An unknown form, or a reaction time that is no multiple of the
-            control step.
+        ValueError: An observation type is unknown, or the reaction time is not a
+            multiple of the control step.
     """
 
     def __init__(
@@ -65,7 +64,7 @@ class Observer:
             if form not in OBSERVE:
                 raise ValueError(unknown_name("observe", form, OBSERVE))
         self.observe = self.forms[0]
-        """Form of the open seats' observations."""
+        """Observation type of the open seats."""
         self._top_speed = physics.highest("paddle_speed")
         steps = _whole_steps(scenario.reaction, sensor.control_dt)
         self._delay = ReactionDelay(steps) if steps else None
@@ -78,15 +77,15 @@ class Observer:
         self.layout_of(self.observe)
 
     def layout_of(self, form: str) -> ObservationLayout:
-        """Return the layout of a form; that of "pixels" is the one of "velocity".
+        """Return the layout of an observation type ("velocity" for "pixels").
 
         Raises:
-            ValueError: A form that these worlds were not built for.
+            ValueError: The worlds were not built for this observation type.
         """
         if form not in self.forms:
             raise ValueError(
-                f"observe: {form!r} cannot be read here, only {', '.join(self.forms)}; "
-                f"name it when the worlds are built, forms=({form!r},)"
+                f"observe: {form!r} is not one of {', '.join(self.forms)}, types of "
+                f"these worlds; build them with forms=({form!r},)"
             )
         if form not in self._layouts:
             scope = ObservationContext(
@@ -111,14 +110,14 @@ class Observer:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of the numbers that open seats observe; none for pictures."""
+        """Names of the elements that open seats observe; none for images."""
         return () if self.observe == "pixels" else self.layout.labels
 
     def begin(self, worlds: Array, sensed: State, memory: Memory) -> None:
-        """Begin an episode in some worlds, by index; compile what is not compiled yet.
+        """Begin an episode in some worlds; compile code that is not compiled yet.
 
         Args:
-            worlds: Indices (W,) of the worlds.
+            worlds: Indices of the worlds (W,).
             sensed: Sensed state of all worlds, table frame.
             memory: Memory of the scenario in all worlds.
         """
@@ -129,18 +128,18 @@ class Observer:
                 fused.prepare(*self._sources(sensed, memory, form))
 
     def note(self, sensed: State, memory: Memory) -> None:
-        """Append what is sensed after a step to what is observed later."""
+        """Store the sensed state after a step, for later observations."""
         if self._delay is not None:
             self._delay.push(self._parts(sensed, memory))
 
     def known(
         self, sensed: State, memory: Memory, form: str = "velocity"
     ) -> tuple[State, Memory]:
-        """Return the state and the memory of all worlds as seats know them now.
+        """Return the state and the memory of all worlds that seats know now.
 
         Args:
-            sensed: Sensed state now.
-            memory: Memory now.
+            sensed: Current sensed state.
+            memory: Current memory.
             form: "estimate" for estimated pucks, any other form for sensed ones.
         """
         estimate = form == "estimate"
@@ -150,7 +149,7 @@ class Observer:
         return replace(sensed, **state), self._delay.delayed("memory")
 
     def prepare(self, state: State, memory: Memory) -> Sink:
-        """Return arrays (B, seats, ...) for `stage` to fill; none if not direct."""
+        """Return arrays (B, seats, ...) for `stage` to fill; none if not `direct`."""
         if not self.direct:
             return {}
         fused = self._fused[self.observe]
@@ -174,13 +173,13 @@ class Observer:
         form: str | None = None,
         worlds: Rows = ALL,
     ) -> Observation:
-        """Return observations of some seats, in their order, freshly allocated.
+        """Return observations of some seats, in their order, in new arrays.
 
         Args:
             sensed: Sensed state of all worlds, table frame.
             memory: Memory of the scenario in all worlds.
-            seats: Indices (n,) of the seats.
-            form: Form of the observations; None for that of the open seats.
+            seats: Indices of the seats (n,).
+            form: Observation type; None for the type of the open seats.
             worlds: Worlds to observe.
         """
         form = form or self.observe
@@ -193,7 +192,7 @@ class Observer:
         return self.of_seats(found[0], seats)
 
     def of_seats(self, shown: Sink, seats: Array) -> Observation:
-        """Return the observations of some seats from those of all; no copy of all."""
+        """Select the observations of some seats; the arrays of all are not copied."""
         flat = shown["flat"]
         if len(seats) != len(self.scenario.scene.seats):
             flat = flat[:, seats]
@@ -202,10 +201,10 @@ class Observer:
         return {"observation": flat} | {name: shown[name] for name in GOALS}
 
     def blank(self, form: str | None, rows: int) -> Observation:
-        """Return observations of one seat that are all zeros, (rows, ...) each.
+        """Return observations of one seat that are all zeros (rows, ...).
 
         Args:
-            form: Form of the observations; None for that of the open seats.
+            form: Observation type; None for the type of the open seats.
             rows: Number of rows.
         """
         form = form or self.observe
@@ -219,7 +218,7 @@ class Observer:
         return {"observation": flat} | {n: np.zeros(shape, np.float32) for n in GOALS}
 
     def _parts(self, sensed: State, memory: Memory) -> Parts:
-        """Return what is observed with the latency of the game."""
+        """Return the parts that are observed with the reaction time."""
         past = self.sensor.past() | {"frames": self.sensor.frames}
         parts = {"state": vars(sensed), "memory": memory, "sensor": past}
         if "estimate" in self.forms:
@@ -229,13 +228,13 @@ class Observer:
     def _sources(
         self, sensed: State, memory: Memory, form: str
     ) -> tuple[Source, Source, Source]:
-        """Return the arrays of all worlds from which a form of observations is made."""
+        """Return the arrays of all worlds from which an observation is computed."""
         state, known = self.known(sensed, memory, form)
         sensor = self.sensor.past()
         if self._delay is not None:
-            # The own paddle, and what was requested of it, are known immediately.
+            # A seat knows its own paddle and its last actions immediately.
             sensor["history"] = self._delay.delayed("sensor")["history"]
-            # Contiguous, as compiled loops take them.
+            # Compiled loops require contiguous arrays.
             own = sensed.paddle, sensed.paddle_velocity
             sensor["own"], sensor["own_velocity"] = map(np.ascontiguousarray, own)
         return vars(state), known, sensor
@@ -243,7 +242,7 @@ class Observer:
     def _show(
         self, layout: ObservationLayout, sensed: Source, memory: Memory, sensor: Source
     ) -> tuple[Sink]:
-        """Return the numbers of a layout, and the goals of goals="dict"."""
+        """Return the elements of a layout and, with goals="dict", the goals."""
         game, state = self.scenario, State(**sensed)
         own = state.paddle, state.paddle_velocity
         if layout.scope.reaction:
@@ -271,21 +270,21 @@ def _whole_steps(reaction: float, control_dt: float) -> int:
     """Return a reaction time in control steps.
 
     Raises:
-        ValueError: It is no multiple of them.
+        ValueError: It is not a multiple of ``control_dt``.
     """
     steps = round(reaction / control_dt)
     if abs(steps * control_dt - reaction) > 1e-6:
         near = [k * control_dt for k in (steps, steps + 1)]
         raise ValueError(
-            f"reaction: {reaction:g} s is no multiple of control_dt, "
-            f"{control_dt:g} s; give another control_dt or an option, e.g. "
+            f"reaction: {reaction:g} s is not a multiple of control_dt, "
+            f"{control_dt:g} s; set another control_dt or an option, e.g. "
             f'options={{"reaction": {near[0]:g}}} or {near[1]:g}'
         )
     return steps
 
 
 def duplicate(observation: Observation) -> Observation:
-    """Return a copy of an observation, which shares no array with it."""
+    """Return a copy of an observation with new arrays."""
     if isinstance(observation, np.ndarray):
         return observation.copy()
     return {name: array.copy() for name, array in observation.items()}

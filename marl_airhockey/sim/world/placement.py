@@ -1,4 +1,4 @@
-"""Bounds of bodies that are placed from outside: on the table, apart, not too fast."""
+"""Checks of given states: bodies on the table, without overlap, and not too fast."""
 
 from __future__ import annotations
 
@@ -13,30 +13,31 @@ from marl_airhockey.sim.core.state import Kind, State
 from marl_airhockey.types import Array
 
 DEEPEST = 0.01
-"""Depth to which bodies may overlap; contacts of pymunk and robosuite are soft (m)."""
+"""Largest overlap of bodies, m; contacts of pymunk and robosuite are soft."""
 PRESSED = 0.02
-"""Depth to which a paddle that is moved from outside may press a puck into a side, as
-far as pymunk lets it (m)."""
+"""Largest depth to which a position-driven paddle may press a puck into a side, m,
+which pymunk allows."""
 REACH_SLACK = 0.03
-"""Distance by which an arm may be beyond its reach (m)."""
+"""Largest distance of an arm's paddle beyond its workspace, m."""
 FASTEST = 50.0
-"""Speed that no body exceeds (m/s)."""
+"""Largest speed of a body, m/s."""
 
 
 def check_placement(state: State, scene: Scene, parked: Array, longest: float) -> None:
-    """Refuse rows of a state in which a body is where, or as fast as, none can be.
+    """Check that positions, speeds and times of a given state are possible.
 
-    A paddle that is moved from outside may be over a puck, and one that a teammate
-    pushes in an obstacle.
+    A position-driven paddle may overlap a puck. A paddle that a teammate pushes may
+    overlap an obstacle.
 
     Args:
-        state: rows (W,) of bodies.
-        scene: what is on the table.
-        parked: (W, seats) bool: True for paddles that have left the game.
-        longest: length of an episode, s.
+        state: State of W worlds.
+        scene: Scene on the table.
+        parked: True for paddles of eliminated players (W, seats).
+        longest: Length of an episode, s.
 
     Raises:
-        ValueError: The first such body, or time, its world and the bound.
+        ValueError: A value is not possible. The message names the first body, its world
+            and the bound.
     """
     _refuse("its time is {} s", state.time, longest + 1e-9, 1.0)
     _refuse("its time is {} s before the episode", -state.time, 0.0, 1.0)
@@ -58,9 +59,9 @@ def check_placement(state: State, scene: Scene, parked: Array, longest: float) -
         _refuse(f"{names[i]} is off the table by {{}} mm", off, most)
     beyond = np.where(parked, 0.0, _beyond_reach(state, scene))
     for i in range(state.bodies.paddles):
-        what = f"paddle_{i} is out of the reach of its seat by {{}} mm"
+        what = f"paddle_{i} is outside the workspace of its seat by {{}} mm"
         _refuse(what, beyond[:, i], REACH_SLACK)
-    # A puck that has ended a game stays on the goal line, and paddles pass it.
+    # A puck that has ended a game stays on the goal line, and paddles may overlap it.
     gone[:, state.bodies.puck] = _on_goal_line(state, scene)
     paddles, pucks = state.bodies.paddles, state.bodies.pucks
     for i, k in combinations(range(state.bodies.movers), 2):
@@ -73,7 +74,7 @@ def check_placement(state: State, scene: Scene, parked: Array, longest: float) -
 
 
 def _refuse(what: str, values: Array, most: float, scale: float = 1e3) -> None:
-    """Refuse the first world whose value is above a bound; ``scale`` is of the text."""
+    """Raise an error for the first value above a bound; the text is times ``scale``."""
     worlds = np.flatnonzero(values > most)
     if len(worlds):
         found = what.format(f"{scale * values[worlds[0]]:.4g}")
@@ -82,9 +83,9 @@ def _refuse(what: str, values: Array, most: float, scale: float = 1e3) -> None:
 
 
 def _depth(state: State, scene: Scene, body: int) -> Array:
-    """(W,) depth of a body in a side or an obstacle, m; < 0 if it is clear of both.
+    """Return the depth of a body in a side or an obstacle (W,), m; < 0 outside of both.
 
-    The centre of a puck may be as far as a goal line. Of paddles, sides alone count.
+    The centre of a puck may be on a goal line. For paddles only sides are checked.
     """
     table, position = scene.table, state.position[:, body]
     radius = state.bodies.radius[body]
@@ -100,7 +101,7 @@ def _depth(state: State, scene: Scene, body: int) -> Array:
 
 
 def _before_goal(position: Array, scene: Scene) -> Array:
-    """(..., sides) bool: a point (..., 2) is between the ends of a side's goal line."""
+    """Return True for points between the ends of a side's goal line (..., sides)."""
     sides = scene.table.normals.shape[0]
     before = np.zeros((*position.shape[:-1], sides), np.bool_)
     for line in scene.goal_lines:
@@ -112,13 +113,13 @@ def _before_goal(position: Array, scene: Scene) -> Array:
 
 
 def _on_goal_line(state: State, scene: Scene) -> Array:
-    """(W, pucks) bool: the centre of a puck is on a goal line, or beyond it."""
+    """Return True for pucks with the centre on or beyond a goal line (W, pucks)."""
     depth = -(state.puck @ scene.table.normals.T + scene.table.offsets)
     return np.asarray((_before_goal(state.puck, scene) & (depth > -1e-6)).any(-1))
 
 
 def _beyond_reach(state: State, scene: Scene) -> Array:
-    """(W, seats) distance of each paddle beyond its seat's reach, m."""
+    """Return the distance of each paddle beyond its workspace (W, seats), m."""
     normals, offsets = reaches(scene.table, scene.seats)
     inside = np.einsum("skd,wsd->wsk", normals, state.paddle) + offsets
     return np.asarray(-inside.min(-1))

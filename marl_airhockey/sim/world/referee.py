@@ -16,36 +16,37 @@ from marl_airhockey.types import Array, Memory
 
 
 class Verdict(NamedTuple):
-    """Verdict on a step, (B, ...) arrays."""
+    """Verdict on a step, arrays (B, ...)."""
 
     memory: Memory
     terms: dict[str, Array]
-    """Reward terms by name, (B, seats) each"""
+    """Reward terms by name (B, seats)."""
     counters: dict[str, Array]
-    """New counters of `EpisodeCounters`, by name"""
+    """New counters of `EpisodeCounters`, by name."""
     outcome: dict[str, Array]
-    """``reward`` (B, seats), ``terminated``, ``truncated``, ``serves`` (B,), if the
-    game serves, and ``applied_action`` (B, seats, 2) float32: fractions of top speed in
-    ego frames"""
+    """Outcome by name: ``reward`` (B, seats); ``terminated`` and ``truncated`` (B,);
+    ``serves`` (B,), if the game serves pucks; ``applied_action`` (B, seats, 2) float32,
+    the velocity of the paddle, or the command of an arm, divided by the top speed, ego
+    frames."""
 
 
 class Step(NamedTuple):
-    """Arrays that a verdict is made from."""
+    """Arrays from which a verdict is computed."""
 
     before: State
     command: Array
-    """(B, seats, 2) m/s, table frame"""
+    """Commanded velocities (B, seats, 2), table frame, m/s."""
     after: State
     memory: Memory
-    """Memory of before the step"""
+    """Memory before the step."""
     episode: EpisodeCounters
-    """Counters of before the step"""
+    """Counters before the step."""
     limit: Array
-    """(B,) control steps after which the clock ends an episode"""
+    """Number of control steps after which an episode is truncated (B,)."""
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Sources of the compiled rules."""
+        """Inputs of the compiled rules."""
         action = {"command": self.command, "limit": self.limit}
         episode = self.episode
         return (
@@ -55,12 +56,12 @@ class Step(NamedTuple):
 
 
 class Referee:
-    """Rules of a scenario, and the score of its episodes.
+    """Rules of a scenario and counters of its episodes.
 
     Args:
-        scenario: Scenario whose rules are applied.
-        rotations: Rotations (S, 2, 2) from the table frame to each seat's ego frame.
-        tracks_commands: Whether paddles move as commanded unless something stops them.
+        scenario: Scenario with the rules.
+        rotations: Rotations from the table frame to each seat's ego frame (S, 2, 2).
+        tracks_commands: True if paddles move as commanded until a contact stops them.
     """
 
     def __init__(
@@ -77,11 +78,11 @@ class Referee:
         return self._fused.refused
 
     def prepare(self, step: Step) -> Verdict:
-        """Compile the rules for arrays like these; return the verdict, fresh arrays."""
+        """Compile the rules for arrays like these; return the verdict in new arrays."""
         return Verdict(*self._fused.prepare(*step.sources))
 
     def stage(self, step: Step, verdict: Verdict) -> Stage:
-        """Return the rules from a step into a verdict whose arrays stay."""
+        """Return the stage that applies the rules to a step and fills a verdict."""
         return self._fused.stage(step.sources, verdict)
 
     def _judge(
@@ -113,7 +114,7 @@ class Referee:
             fresh = counters["success"].any(-1) & ~episode["success"].any(-1)
             few = t.new_memory["touches"].sum((-1, -2)) <= 1
             counters["first_shot"] = episode["first_shot"] | (fresh & few)
-        # What a paddle could not do, as a puck or another paddle was in its way.
+        # Contacts can stop a paddle that tracks commands, so use its actual velocity.
         rotated = after.paddle_velocity if self._tracks_commands else command
         if not self._straight:
             rotated = (self._rotations @ rotated[..., None])[..., 0]
@@ -133,9 +134,9 @@ class Referee:
 def _check_shapes(
     terms: Memory, terminated: Array, success: Array, shape: tuple[int, ...]
 ) -> None:
-    """Refuse results of a scenario that have not a number for each seat, (..., S)."""
+    """Check that the results of a scenario have a number for each seat (..., S)."""
     lead = shape[:-1]
-    per_seat = "a number for each seat, {}; end one of the whole world with [..., None]"
+    per_seat = "a number for each seat, {}; add [..., None] to a number for the world"
     for name, term in terms.items():
         if np.shape(term) not in (shape, (*lead, 1)):
             raise ValueError(
@@ -144,8 +145,8 @@ def _check_shapes(
             )
     if np.shape(terminated) != lead:
         raise ValueError(
-            f"terminated has shape {np.shape(terminated)}, expected {lead}: a truth "
-            "value for each world"
+            f"terminated has shape {np.shape(terminated)}, expected {lead}: a bool for "
+            "each world"
         )
     if np.shape(success) not in (lead, shape, (*lead, 1)):
         raise ValueError(

@@ -1,4 +1,4 @@
-"""Many drivers at the seats of one batch of worlds: who sits where differs by world."""
+"""Roster: many drivers in one batch of worlds; their seats differ between worlds."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from marl_airhockey.types import Array
 
 
 class Roster:
-    """Players of a game, each able to take any seat in any of B worlds.
+    """Players of a game; each can take any open seat in any of B worlds.
 
     Args:
-        world: the worlds; the seats that players take are open ones.
+        world: Worlds of the game.
     """
 
     def __init__(self, world: World) -> None:
@@ -22,7 +22,7 @@ class Roster:
         self.names: list[str] = []
         self._seats: list[list[DrivenSeat]] = []
         self.seated = np.full((world.num_worlds, len(world.scene.seats)), -1)
-        """(B, seats) which player sits where, by number; -1 for none of them."""
+        """Number of the player at each seat (B, seats); -1 for none."""
 
     def add(self, name: str, driver: Driver) -> int:
         """Add a player and return its number."""
@@ -39,24 +39,24 @@ class Roster:
         return len(self.names) - 1
 
     def replace(self, player: int, name: str, driver: Driver) -> None:
-        """Give a player's number to another; take it off all seats first."""
+        """Replace a player that takes no seat by another one with the same number."""
         self.add(name, driver)
         self._seats[player], self.names[player] = self._seats.pop(), self.names.pop()
 
     def begin(self, worlds: Array) -> None:
-        """Begin an episode in some worlds, by index: after they restarted."""
+        """Begin an episode in some worlds, by index (W,), after their reset."""
         seeds, episodes = self.world.seeds, self.world.episode.number
         for player, seat, rows in self._sitting(worlds):
             self._seats[player][seat].reset(rows, seeds, episodes)
 
     def ask(self, actions: Array) -> None:
-        """Fill in (B, seats, 2) what players ask for; other seats are left alone."""
+        """Fill the actions of players (B, seats, 2); other seats do not change."""
         known = self.world.known
         for player, seat, rows in self._sitting(np.arange(self.world.num_worlds)):
             actions[rows, seat] = self._seats[player][seat].act(known, rows)
 
     def _sitting(self, worlds: Array) -> list[tuple[int, int, Array]]:
-        """Player, seat and the worlds, among some, where the one sits at the other."""
+        """Return (player, seat, worlds) for the seats of players in some worlds."""
         seated, found = self.seated[worlds], []
         for seat in range(seated.shape[1]):
             order = np.argsort(seated[:, seat], kind="stable")

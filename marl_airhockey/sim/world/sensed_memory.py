@@ -1,7 +1,8 @@
-"""Sensed memory: the memory of a scenario as seats know it under simulated sensing.
+"""Sensed memory: the memory of a scenario that seats know with simulated sensing.
 
-The rules judge the true state. Seats know a contact only once a frame shows it, so what
-observations show of the memory follows from the sensed states, by the same functions.
+The rules use the true state. Seats know a contact only after a camera frame shows it.
+The memory in observations is therefore computed from sensed states, by the same
+functions.
 """
 
 from __future__ import annotations
@@ -18,19 +19,19 @@ class SensedMemory:
     """Memory of the episodes of B worlds, from their sensed states.
 
     Args:
-        scenario: Scenario whose memory it is.
+        scenario: Scenario of the memory.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self.now: Memory = {}
-        """Arrays by name, (B, ...)"""
+        """Arrays by name (B, ...)."""
         self._fused = Fused(self._next, scenario.name)
 
     def begin(self, worlds: Array, memory: Memory) -> None:
-        """Take the true memory in some worlds, by index, where an episode begins.
+        """Copy the true memory of some worlds, by index (W,), when an episode begins.
 
-        The same holds for a serve, with which the referee announces what has happened.
+        Call it also after a serve, because the referee announces the events before it.
         """
         for name, array in memory.items():
             mine = self.now.setdefault(name, array.copy())
@@ -39,11 +40,11 @@ class SensedMemory:
     def update(
         self, before: State, command: Array, after: State, memory: Memory
     ) -> None:
-        """Follow a step of all worlds.
+        """Update the memory after a step of all worlds.
 
         Args:
             before: Sensed state before the step.
-            command: Commands (B, seats, 2) of the step, m/s.
+            command: Commanded velocities (B, seats, 2), table frame, m/s.
             after: Sensed state after the step.
             memory: True memory after the step.
         """

@@ -1,10 +1,13 @@
-"""States and memories that are set from outside: checked, and without past events.
+"""Checks of given states and memories for `World.set_state`.
 
-`World.set_state` continues as if every body had moved there at its velocity and bodies
-that touch had touched before: lasting contacts and crossings are not new ones, the
-sensor's past is that of constant velocities, no delayed action is under way, and the
-memory of drivers is new. The clock is that of ``state.time``; returns and success are
-reset. Episode number, seed, physics and random streams continue.
+`World.set_state` continues as if every body had arrived with its velocity, and as if
+bodies in contact had been in contact before:
+
+- Contacts and crossings in the state are not new events.
+- The history of the sensor follows from constant velocities.
+- There are no delayed actions, and the memory of drivers is new.
+- The clock is ``state.time``. Returns and success are reset.
+- Episode number, seed, physics and random streams continue.
 """
 
 from __future__ import annotations
@@ -21,10 +24,11 @@ from marl_airhockey.types import Array, Memory
 
 
 def checked_worlds(worlds: object, count: int) -> Array:
-    """Return indices (W,) of some of ``count`` worlds; None for all.
+    """Return the checked indices of worlds (W,); None selects all ``count`` worlds.
 
     Raises:
-        ValueError: Not whole numbers, none at all, one twice, or one that is no world.
+        ValueError: An index is not a whole number, does not exist or occurs twice, or
+            there is no index.
     """
     if worlds is None:
         return np.arange(count)
@@ -33,31 +37,34 @@ def checked_worlds(worlds: object, count: int) -> Array:
         raise ValueError(f"worlds: expected indices of worlds, got {worlds!r}")
     odd = found[(found < 0) | (found >= count)]
     if len(odd):
-        raise ValueError(f"worlds: there is no world {odd[0]}, only {count} from 0 on")
+        raise ValueError(
+            f"worlds: there is no world {odd[0]}; the batch has {count}, counted from 0"
+        )
     if len(np.unique(found)) < len(found):
-        raise ValueError(f"worlds: {worlds!r} names one twice")
+        raise ValueError(f"worlds: {worlds!r} contains an index twice")
     return found
 
 
 def settled(state: State, scene: Scene, count: int) -> State:
-    """Return a given state as rows in which nothing is happening.
+    """Return a given state with W rows and without events.
 
-    Overlapping paddles and pucks touch; there is no other event.
+    Overlapping paddles and pucks are in contact.
 
     Args:
-        state: (W, ...), or of one world without the leading axis.
-        scene: what must be on the table.
-        count: W.
+        state: State (W, ...); for one world, the leading axis may be missing.
+        scene: Scene of the worlds.
+        count: Number of worlds, W.
 
     Raises:
-        ValueError: another scene, or a field of a wrong shape or not finite, named.
+        ValueError: The state belongs to another scene, or a field has a wrong shape or
+            is not finite.
     """
     if not isinstance(state, State):
         raise ValueError(f"state: expected a State, got {type(state).__name__}")
     if _counts(state.bodies) != _counts(scene.bodies):
         raise ValueError(
-            f"state: it is of another scene, with {_counts(state.bodies)}; here there "
-            f"are {_counts(scene.bodies)}"
+            f"state: it is of another scene, with {_counts(state.bodies)}; expected "
+            f"{_counts(scene.bodies)}"
         )
     rest = scene.still_state(count)
     fields: dict[str, Any] = {}
@@ -79,7 +86,9 @@ def settled(state: State, scene: Scene, count: int) -> State:
     if not np.array_equal(
         fields["position"][:, obstacles:], rest.position[:, obstacles:]
     ):
-        raise ValueError("state.position: obstacles must be where the scene has them")
+        raise ValueError(
+            "state.position: obstacles must be at their positions in the scene"
+        )
     made = replace(rest, **fields)
     gap = made.paddle[..., :, None, :] - made.puck[..., None, :, :]
     touch = scene.table.paddle_radius + scene.table.puck_radius
@@ -91,7 +100,7 @@ def _numbers(name: str, given: object) -> Array:
     """Return an array of real numbers.
 
     Raises:
-        ValueError: Something else, named.
+        ValueError: The elements are not real numbers.
     """
     try:
         found = np.asarray(given)
@@ -103,22 +112,22 @@ def _numbers(name: str, given: object) -> Array:
 
 
 def _counts(bodies: Bodies) -> str:
-    """Return how many bodies of each kind there are, in words."""
+    """Return the number of bodies of each kind as a text."""
     kinds = ("paddles", "pucks", "blocks", "obstacles")
     return ", ".join(f"{getattr(bodies, kind)} {kind}" for kind in kinds)
 
 
 def checked_memory(memory: Memory, like: Memory, count: int) -> Memory:
-    """Return a given memory with ``count`` rows.
+    """Return a given memory with W rows.
 
     Args:
-        memory: (W, ...), or of one world without the leading axis.
-        like: memory that the worlds have.
-        count: W.
+        memory: Memory (W, ...); for one world, the leading axis may be missing.
+        like: Memory of the worlds.
+        count: Number of worlds, W.
 
     Raises:
-        ValueError: a missing or unknown name, a wrong shape, or what is no number,
-            named.
+        ValueError: A name is missing or unknown, a shape is wrong, or an element is not
+            a number.
     """
     for name in memory:
         if name not in like:

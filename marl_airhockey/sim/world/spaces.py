@@ -1,4 +1,4 @@
-"""Gymnasium spaces of actions and observations, and what a critic may know."""
+"""Gymnasium spaces of actions, observations and the state for a critic."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 def action_space() -> spaces.Box:
-    """Wanted velocity as a fraction of top speed, ego frame: Box(-1, 1, (2,))."""
+    """Return Box(-1, 1, (2,)): target velocity divided by the top speed, ego frame."""
     return spaces.Box(-1.0, 1.0, (2,), np.float32)
 
 
 def observation_space(observer: Observer, observe: str | None = None) -> Any:
-    """Box, or the Dict of goals="dict"."""
+    """Return the Box of an observation, or with goals="dict" the Dict."""
     observe = observe or observer.observe
     if observe == "pixels":
         return spaces.Box(0, 255, (PIXELS, PIXELS, FRAMES), np.uint8)
@@ -39,7 +39,7 @@ def observation_space(observer: Observer, observe: str | None = None) -> Any:
 
 
 class WorldSpaces:
-    """Mixin of worlds: spaces of an open seat, and the state that a critic may know."""
+    """Mixin of worlds: spaces of an open seat, and the state for a critic."""
 
     observer: Observer
 
@@ -64,12 +64,12 @@ class WorldSpaces:
 
     @property
     def critic_state_labels(self) -> tuple[str, ...]:
-        """Name of each number of a row of `critic_state`."""
+        """Name of each element of a row of `critic_state`."""
         return self._global_state.labels
 
     def critic_state(self) -> Array:
-        """Return (B, S) float32: the true state, for a critic of all seats.
+        """Return the true state for a critic of all seats (B, S), float32, a new array.
 
-        See `global_state.GlobalState`; freshly allocated.
+        `global_state.GlobalState` defines the elements.
         """
         return self._global_state.read()

@@ -1,4 +1,4 @@
-"""Result of a step, as a world returns it."""
+"""Result of a step of B worlds."""
 
 from __future__ import annotations
 
@@ -15,40 +15,41 @@ from marl_airhockey.types import Array, Memory
 
 @dataclass
 class StepResult:
-    """Result of a step of B worlds for its open seats; arrays (B, ...), yours."""
+    """Result of a step of B worlds for the open seats, in new arrays (B, ...)."""
 
     observation: Observation
     reward: Array
-    """(B, open)"""
+    """Rewards (B, open)."""
     terminated: Array
-    """(B,) the episode ended for a reason inside the game"""
+    """True if the episode ended by the rules (B,)."""
     truncated: Array
-    """(B,) the clock ended it"""
+    """True if the episode ended by the time limit (B,)."""
     terms: dict[str, Array]
-    """Reward terms by name, (B, open) each"""
+    """Reward terms by name (B, open)."""
     applied_action: Array
-    """(B, open, 2) command as a fraction of top speed, ego frame"""
+    """Velocity of the paddle, or command of an arm (B, open, 2), divided by the top
+    speed, ego frame."""
     violation: Array
-    """(B, seats, 5) excess of the action over the limits, see `limits.VIOLATIONS`"""
+    """Excess of the action over the limits (B, seats, 5), see `limits.VIOLATIONS`."""
     cost: Array
-    """(B, open) violations in units of their limits, summed"""
+    """Sum of the violations, each divided by its limit (B, open)."""
     success: Array
-    """(B, open) bool, latched for the episode"""
+    """True if the episode has been a success (B, open)."""
     first_shot: Array
-    """(B,) bool: succeeded before a second distinct touch"""
+    """True if it has been a success before a second distinct touch (B,)."""
     interruption: str = ""
-    """Reason for which a real table had to end the episode"""
+    """Reason why an episode on a real table could not continue; "" for none."""
     final_observation: Observation | None = None
-    """Observations at the end of the episodes that ended, rows of all others stale;
-    None if none ended or worlds do not restart by themselves"""
+    """Last observations of the episodes that ended. All other rows are invalid. None if
+    no episode ended, or if worlds do not reset automatically."""
 
     @staticmethod
     def of(moment: Moment, open_seats: Array | None) -> StepResult:
-        """Return the result but for the observation; freshly allocated.
+        """Return the result without the observation, in new arrays.
 
         Args:
-            moment: after the step.
-            open_seats: (open,) indices of the open seats; None for all.
+            moment: Moment after the step.
+            open_seats: Indices of the open seats (open,); None for all.
         """
         outcome, terms = moment.verdict.outcome, moment.verdict.terms
         violation, success = moment.commanded.violation.copy(), moment.episode.success
@@ -72,7 +73,7 @@ class StepResult:
         )
 
     def clear(self, worlds: Array | slice = slice(None)) -> None:
-        """Make it the result of no step in some worlds, by index: all 0."""
+        """Set all values of some worlds, by index (W,), to 0."""
         numbers = [v for v in vars(self).values() if isinstance(v, np.ndarray)]
         for array in (*numbers, *self.terms.values()):
             array[worlds] = 0
@@ -80,17 +81,17 @@ class StepResult:
     def judge_shown(
         self, game: Scenario, state: State, memory: Memory, moment: Moment, limit: Array
     ) -> None:
-        """Replace reward and end by those of what is observed, with goals="dict".
+        """Compute reward and end from the observed goals, for goals="dict".
 
-        The reward must be `goal_reward` of the goals in the observation, or relabelled
-        transitions would contradict recorded ones. Success is that of the true state.
+        The reward must be `goal_reward` of the observed goals. Otherwise relabelled
+        transitions would contradict recorded ones. Success follows the true state.
 
         Args:
             game: Scenario with goals="dict".
-            state: State of all worlds as seats know it, sensed or estimated.
-            memory: Memory of all worlds as seats know it.
+            state: State of all worlds that seats know, sensed or estimated.
+            memory: Memory of all worlds that seats know.
             moment: Moment after the step; the returns of its episodes are corrected.
-            limit: Control steps (B,) after which the clock ends an episode.
+            limit: Number of control steps after which an episode is truncated (B,).
         """
         episode = moment.episode
         met = game.goal_met(state, memory)

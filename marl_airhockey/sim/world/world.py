@@ -1,16 +1,18 @@
-"""World: one step function over B worlds, which all environments are views of.
+"""World: one step function for B worlds, which all environments use.
 
-A step, `World.step`:
+`World.step` has seven parts:
 
-1. collect: actions of open seats and drivers -> inputs, delayed (`world.actions`)
-2. limit: action -> command, followed by a servo if there is one (`core.limits`)
-3. move: command -> state (`backends`)
-4. judge: state -> memory, reward terms, success, end (`world.referee`)
-5. observe: state -> observation, where seats observe the true state (`world.observer`)
-6. sense: state -> sensed state, served pucks included (`sensing`); observe that else
-7. reset: a new episode in the worlds where one ended
+1. Collect the actions of open seats and drivers, and delay them (`world.actions`).
+2. Limit the actions. The result is the command, which a servo may follow
+   (`core.limits`).
+3. Compute the next state from the command (`backends`).
+4. Compute memory, reward terms, success and end from the state (`world.referee`).
+5. If seats observe the true state, compute the observation from it (`world.observer`).
+6. Compute the sensed state, with re-served pucks (`sensing`). If seats do not observe
+   the true state, compute the observation from the sensed one.
+7. Begin a new episode in the worlds in which one ended.
 
-Steps 2 to 5 are one pipeline of compiled stages (`world.control_step`).
+Parts 2 to 5 are one pipeline of compiled stages (`world.control_step`).
 """
 
 from __future__ import annotations
@@ -51,17 +53,17 @@ NOWHERE = np.zeros(0, np.int64)
 class World(WorldSpaces):
     """B worlds of one scenario on one backend.
 
-    Worlds can be copied and pickled at any moment; the copy is independent.
+    Worlds can be copied and pickled at any moment. The copy is independent.
 
     Args:
-        scenario: Scenario.
-        backend: Physics, built for the scenario's scene.
+        scenario: Scenario of all worlds.
+        backend: Backend, built for the scene of the scenario.
         drivers: Drivers of the seats that are not open, by seat index.
-        physics: Parameters and their ranges.
-        forms: Forms of observations that open seats, drivers and later players can
-            read, see `observable.OBSERVE`; the first one is that of the open seats.
+        physics: Physics parameters and their ranges.
+        forms: Observation types that open seats, drivers and later players can read,
+            see `observable.OBSERVE`. The first one is the type of the open seats.
         max_cycles: Length of an episode in control steps; None for the scenario's.
-        autoreset: Whether a new episode begins immediately where one ended.
+        autoreset: True to begin a new episode in the step in which one ended.
     """
 
     def __init__(
@@ -83,9 +85,9 @@ class World(WorldSpaces):
         self._limit = np.full(b, check_count("max_cycles", cycles))
         self.open = np.array([s for s in seats if s not in drivers], np.int64)
         self.reach = ReachPlanes.of(scene.table, scene.seats)
-        # Here, once: `isinstance` of an abstract class is slow.
+        # Only once, because `isinstance` with an abstract class is slow.
         self.live = live = backend if isinstance(backend, LiveBackend) else None
-        """Backend of a real table; None in simulation"""
+        """Backend of a real table; None in simulation."""
         sight = live.sight if live is not None else None
         self.sensor = Sensor(scene, b, physics, dt, Needs.of(forms), sight)
         self.observer = Observer(scenario, self.sensor, physics, forms)
@@ -98,7 +100,7 @@ class World(WorldSpaces):
         self._actions = Actions(scenario, self.driven, self.open, physics, b, dt)
         self._requested = np.zeros((b, len(seats), 2))
         self._seeded, self.seeds = False, np.zeros(b, np.uint64)
-        """(B,) seed of each world"""
+        """Seed of each world (B,)."""
         self._scatters = physics.any_of(*SCATTER)
         contact = ("contact",) if self._scatters else ()
         self._streams = StreamSet(b, "start", "physics", "sensor", "serve", *contact)
@@ -110,18 +112,18 @@ class World(WorldSpaces):
         check_elements(scenario, sight is not None)
         self._drag = DragRegions(scenario, b) if scenario.drag_regions else None
         self.start_spread = 1.0
-        """Share of the ranges, about their middles, from which episodes start"""
+        """Share of the ranges, around their middles, from which starts are sampled."""
         self.closed = False
-        """True after `close`"""
+        """True after `close`."""
 
     @property
     def state(self) -> State:
-        """True state, table frame; freshly allocated."""
+        """True state, table frame; a copy."""
         return self._state.map(np.copy)
 
     @property
     def judged(self) -> State:
-        """State that the rules judged in the last step, before serves; a copy."""
+        """State that the rules evaluated in the last step, before serves; a copy."""
         return self._judged.map(np.copy)
 
     @property
@@ -131,48 +133,48 @@ class World(WorldSpaces):
 
     @property
     def sensed(self) -> State:
-        """State as the sensor sees it, table frame; freshly allocated."""
+        """State that the sensor measures, table frame; a copy."""
         return self._sensed.map(np.copy)
 
     @property
     def memory(self) -> Memory:
-        """Memory of the scenario; freshly allocated."""
+        """Memory of the scenario, arrays (B, ...) by name; copies."""
         return {name: array.copy() for name, array in self._memory.items()}
 
     @property
     def known(self) -> Known:
-        """What seats know now; freshly allocated, but for the physics."""
+        """Current knowledge of the seats; a copy, except for the physics."""
         return self._known.copied()
 
     @property
     def episode(self) -> EpisodeCounters:
-        """Counters of the running episodes; freshly allocated, but for the physics."""
+        """Counters of the running episodes; a copy, except for the physics."""
         return self._episode.copied()
 
     @property
     def action(self) -> Array:
-        """(B, seats, 2) actions of the last step, after their delay; a copy."""
+        """Actions of the last step, after their latency (B, seats, 2); a copy."""
         return self._actions.inputs.action.copy()
 
     @property
     def requested(self) -> Array:
-        """(B, seats, 2) actions of the last step, before their delay; a copy."""
+        """Actions of the last step, before their latency (B, seats, 2); a copy."""
         return self._requested.copy()
 
     @property
     def command(self) -> Array:
-        """(B, seats, 2) command of the last step, table frame, m/s; a copy."""
+        """Command of the last step (B, seats, 2), table frame, m/s; a copy."""
         return self._built.now.realized.velocity.copy()
 
     @property
     def terms(self) -> dict[str, Array]:
-        """Reward terms of the last step by name, (B, seats) each; copies."""
+        """Reward terms of the last step by name (B, seats); copies."""
         terms = self._built.now.verdict.terms
         return {name: term.copy() for name, term in terms.items()}
 
     @property
     def observation_labels(self) -> tuple[str, ...]:
-        """Name of each element of an open seat's flat observation; or none."""
+        """Name of each element of an open seat's flat observation; none for images."""
         return self.observer.labels
 
     @property
@@ -186,18 +188,18 @@ class World(WorldSpaces):
 
     @property
     def limits(self) -> Array:
-        """(B,) length of an episode in control steps; a copy."""
+        """Length of an episode in control steps (B,); a copy."""
         return self._limit.copy()
 
     def limit_cycles(self, cycles: int, worlds: Array | None = None) -> None:
-        """Set the length of an episode, from the one that is running on.
+        """Set the length of the running and of later episodes.
 
         Args:
-            cycles: Control steps.
-            worlds: (W,) indices; None for all.
+            cycles: Number of control steps.
+            worlds: Indices of worlds (W,); None for all.
 
         Raises:
-            ValueError: Not a whole number of at least 1.
+            ValueError: ``cycles`` is not a whole number of at least 1.
         """
         self._limit[slice(None) if worlds is None else worlds] = check_count(
             "max_cycles", cycles
@@ -207,8 +209,8 @@ class World(WorldSpaces):
     def outcome(self) -> dict[str, Array]:
         """Outcome of the last step for all seats, and ends of episodes; copies.
 
-        ``reward`` (B, seats), ``applied_action`` (B, seats, 2), ``violation``
-        (B, seats, 5), and (B,) ``terminated`` and ``truncated``.
+        The keys are ``reward`` (B, seats), ``applied_action`` (B, seats, 2),
+        ``violation`` (B, seats, 5), ``terminated`` (B,) and ``truncated`` (B,).
         """
         now = self._built.now
         names = "reward", "applied_action", "terminated", "truncated"
@@ -224,23 +226,25 @@ class World(WorldSpaces):
 
     def _refuse_closed(self, call: str) -> None:
         if self.closed:
-            raise RuntimeError(f"{call}: this environment is closed; build another")
+            raise RuntimeError(
+                f"{call}: this environment is closed; create another one"
+            )
 
     @property
     def eliminated(self) -> Array | None:
-        """(B, seats) bool: True for seats that have left the game; None if none can."""
+        """True for eliminated seats (B, seats); None if no seat can be eliminated."""
         return self.scenario.eliminated(self._memory)
 
     def seed(self, seed: int | Sequence[int] | None = None) -> None:
         """Set the seeds of the worlds from the next `reset` on.
 
         Args:
-            seed: world i gets seed + i, or the i-th of B numbers; None draws one from
-                the system.
+            seed: Seed s, with which world i gets the seed s + i, or a list of B seeds.
+                None for a seed from the operating system.
 
         Raises:
-            ValueError: neither a whole number nor one for each world, or not one from
-                0 to 2^64 - 1.
+            ValueError: The seed is neither a whole number from 0 to 2^64 - 1 nor a list
+                of one for each world.
         """
         if seed is None:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
@@ -249,10 +253,10 @@ class World(WorldSpaces):
         self._seeded = True
 
     def reset(self, seed: int | Sequence[int] | None = None) -> Observation:
-        """Begin a new episode everywhere and return the first observation.
+        """Begin a new episode in all worlds and return the first observation.
 
         Args:
-            seed: see `seed`; None goes on with the streams there are.
+            seed: Seed as in `seed`; None to continue with the current random streams.
         """
         self._refuse_closed("reset")
         if seed is not None or not self._seeded:
@@ -261,13 +265,12 @@ class World(WorldSpaces):
         return self.observation()
 
     def begin(self, rows: State | None, numbers: Array) -> None:
-        """Begin given episodes everywhere, such as recorded ones; see `seed`.
+        """Begin given episodes in all worlds, such as recorded ones; see `seed`.
 
         Args:
-            rows: States (B, ...) in which they begin; None for those that the scenario
-                samples.
-            numbers: (B,) numbers of the episodes since the worlds had their seeds, from
-                1; each has random streams of its own.
+            rows: Start states (B, ...); None to sample them as the scenario does.
+            numbers: Numbers of the episodes since the seed was set, from 1 (B,). Each
+                episode has random streams of its own.
         """
         self._episode.number[:] = numbers - 1
         self.draw_worlds(np.arange(self.num_worlds), rows)
@@ -276,7 +279,7 @@ class World(WorldSpaces):
         """Begin a new episode in some worlds, by index (W,)."""
         rng = self.draw_worlds(worlds)
         if self.live is not None:
-            # All is compiled now, so that no time is lost once the puck moves.
+            # Everything is compiled now, which saves time when the puck moves.
             state = self.live.arrange(self._state)
             memory = self.scenario.initial_memory(state, rng)
             self._begin(worlds, state, self._aimed(rng, state, memory, worlds))
@@ -284,11 +287,10 @@ class World(WorldSpaces):
             seat.reset(worlds, self.seeds, self._episode.number)
 
     def draw_worlds(self, worlds: Array, rows: State | None = None) -> RandomStreams:
-        """Draw how a new episode begins in some worlds, by index (W,).
+        """Sample physics and start of new episodes in some worlds, by index (W,).
 
-        If states are given as ``rows``, it begins with these.
-        On a real table, where somebody has still to bring it about, that is all.
-        Returns the streams from which the start is drawn.
+        States given as ``rows`` replace the sampled ones. On a real table, the start
+        must still be arranged afterwards. Return the random streams of the start.
         """
         number = self._episode.number
         number[worlds] += 1
@@ -312,25 +314,25 @@ class World(WorldSpaces):
     def set_state(
         self, state: State, memory: Memory | None = None, worlds: Array | None = None
     ) -> Observation:
-        """Go on from a given state; return the observation of all worlds.
+        """Continue from a given state; return the observation of all worlds.
 
-        It is as if all bodies had come here at their velocities and what touches had
-        touched for long; returns and success begin at none. See `world.set_state`.
+        Contacts in the state are not new events. Returns and success begin at 0.
+        `world.set_state` explains what else is reset.
 
         Args:
-            state: of W worlds, (W, ...); of one, the leading axis may be missing.
-            memory: of the scenario; None for one of an episode that begins here.
-            worlds: (W,) indices; None for all.
+            state: State of W worlds (W, ...); for one, the leading axis may be missing.
+            memory: Memory of the scenario (W, ...); None for the memory of a new one.
+            worlds: Indices of the worlds (W,); None for all.
 
         Raises:
-            RuntimeError: before the first `reset`.
-            ValueError: an index that is no world, a wrong shape, a number that is not
-                finite, a time before the episode or after its end, or a body off the
-                table, out of its reach, in another one or too fast, named.
+            RuntimeError: There was no `reset` before.
+            ValueError: An index does not exist, a shape is wrong, a number is not
+                finite, the time is outside the episode, or a body is off the table,
+                outside its workspace, in another body or too fast.
         """
         if self._step is None:
             self._refuse_closed("set_state")
-            raise RuntimeError("set_state: call reset() first, which draws the physics")
+            raise RuntimeError("set_state: call reset() first, to sample the physics")
         worlds = checked_worlds(worlds, self.num_worlds)
         rows = settled(state, self.scene, len(worlds))
         longest = float(self._limit[worlds].min()) * self.control_dt
@@ -353,21 +355,21 @@ class World(WorldSpaces):
     def _aimed(
         self, rng: RandomStreams, rows: State, memory: Memory, worlds: Array
     ) -> Memory:
-        """Return the memory of episodes that begin, with what their physics decides."""
+        """Return the memory of new episodes, with the goals that depend on physics."""
         physics = PhysicsRows(self._episode.physics, worlds)
         return self.scenario.finalize_goals(rng, rows, memory, physics)
 
     def _key_scatter(self, worlds: Array) -> None:
-        """Let equal states of an episode have the same future, scatter and all."""
+        """Set the keys of contact noise, so that equal states have equal futures."""
         if self._scatters:
             self.backend.key_scatter(self._streams.keys("contact"), worlds)
 
     def get_state(self) -> tuple[State, Memory]:
-        """Return the true state and the memory, which `set_state` takes."""
+        """Return the true state and the memory, the arguments of `set_state`."""
         return self.state, self.memory
 
     def _begin(self, worlds: Array, rows: State, memory: Memory) -> None:
-        """Begin an episode in some worlds, by index, from rows of state and memory."""
+        """Begin an episode in some worlds, by index (W,), from a state and a memory."""
         if self._step is None:
             rules = self.backend, self.referee, self.observer, self.reach, self._limit
             lags = self.backend.tracks_commands and self.physics.any_of("servo_time")
@@ -382,13 +384,13 @@ class World(WorldSpaces):
         self.observer.begin(worlds, self._sensed, self._known_memory)
 
     def _inform(self, worlds: Array) -> None:
-        """Let seats know the memory in some worlds, by index, as it is."""
+        """Set the known memory of some worlds, by index (W,), to the true memory."""
         if self._follower is not None:
             self._follower.begin(worlds, self._memory)
             self._best = self.sensor.best(self._sensed)
 
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
-        """Put rows of a state and a memory into some worlds, by index."""
+        """Write rows of a state and a memory into some worlds, by index (W,)."""
         self._built.now.write(worlds, rows, memory)
         self.backend.reset(self._state, worlds)
 
@@ -399,7 +401,7 @@ class World(WorldSpaces):
 
     @property
     def _known_memory(self) -> Memory:
-        """Memory as seats know it, which observations show."""
+        """Memory that seats know, which observations contain."""
         return self._memory if self._follower is None else self._follower.now
 
     def _adopt(self, moment: Moment) -> None:
@@ -409,28 +411,33 @@ class World(WorldSpaces):
 
     @property
     def _true(self) -> tuple[State, dict[str, Array], StreamSet]:
-        """State, physics and streams that the sensor takes."""
+        """True state, physics and random streams, which are inputs of the sensor."""
         return self._state, self._episode.physics, self._streams
 
     def observation(self) -> Observation:
-        """Return what the open seats observe now, freshly allocated."""
+        """Return the current observation of the open seats, in new arrays."""
         return self.observer.read(self._sensed, self._known_memory, self.open)
 
     def observe(self, seats: Array) -> Observation:
-        """Return what seats (n,) would observe as open ones, freshly allocated."""
+        """Return the observation of any seats (n,), as if open, in new arrays."""
         return self.observer.read(self._sensed, self._known_memory, seats)
 
     def step(self, actions: Array, prescribed: Array | None = None) -> StepResult:
         """Move all worlds by one control step.
 
         Args:
-            actions: Velocities (B, open, 2), fractions of top speed in ego frames.
-            prescribed: Measured positions and velocities (B, open, 4) of paddles, ego
-                frames, m and m/s; nan for seats that request an action. None: all do.
+            actions: Target velocities (B, open, 2), divided by the top speed, ego
+                frames.
+            prescribed: Measured positions and velocities of position-driven paddles
+                (B, open, 4), ego frames, m and m/s; nan for seats with actions. None if
+                all seats have actions.
+
+        Returns:
+            Result for the open seats.
 
         Raises:
-            RuntimeError: Before the first `reset`.
-            ValueError: A wrong shape, or an element that is not finite.
+            RuntimeError: There was no `reset` before.
+            ValueError: A shape is wrong, or an element is not finite.
         """
         step = self._built
         self._requested = self._actions.collect(actions, prescribed, self._known)
@@ -449,13 +456,13 @@ class World(WorldSpaces):
         return result
 
     def empty_result(self) -> StepResult:
-        """Return the result of no step: all 0, without observation."""
+        """Return a result that is all 0, without an observation."""
         result = StepResult.of(self._built.now, self.open if self.driven else None)
         result.clear()
         return result
 
     def _observe(self, moment: Moment, result: StepResult) -> None:
-        """Sense, serve where a puck is needed, and observe."""
+        """Compute the sensed state, serve pucks if necessary, and observe."""
         observer, seats = self.observer, self.open
         self._sensed = self.sensor.sense(*self._true)
         if self._follower is not None:
@@ -477,14 +484,14 @@ class World(WorldSpaces):
             self._observe_again(result.observation, served)
 
     def _observe_again(self, observation: Observation, worlds: Array) -> None:
-        """Replace what open seats observe in some worlds, by index, in place."""
+        """Replace observations of open seats in some worlds (W,), in place."""
         now = self._sensed, self._known_memory, self.open
         put(observation, worlds, self.observer.read(*now, worlds=worlds))
 
     def _serve(self, moment: Moment) -> Array:
-        """Serve a puck where the rules need one; return these worlds, by index."""
+        """Serve a puck in the worlds that need one; return their indices."""
         serves = moment.verdict.outcome.get("serves")
-        # count_nonzero: for few worlds, `any` costs as much as the physics.
+        # Use count_nonzero: for few worlds, `any` costs as much as the physics.
         if serves is None or not np.count_nonzero(serves):
             return NOWHERE
         worlds, self._judged = np.flatnonzero(serves), self.state
@@ -498,7 +505,7 @@ class World(WorldSpaces):
         return worlds
 
     def _restart(self, result: StepResult) -> None:
-        """Begin a new episode in the worlds that ended."""
+        """Begin a new episode in the worlds in which one ended."""
         ended = result.terminated | result.truncated
         if np.count_nonzero(ended):
             worlds = np.flatnonzero(ended)
@@ -507,7 +514,7 @@ class World(WorldSpaces):
             self._observe_again(result.observation, worlds)
 
     def close(self) -> None:
-        """Close the backend and leave the drivers; nothing can be played any more."""
+        """Close the backend and the drivers; no step is possible afterwards."""
         if self.closed:
             return
         self.closed, self._step = True, None

@@ -38,5 +38,5 @@ def test_the_lab_s_camera_is_as_late_as_it_was_set_up():
 
 def test_a_rig_without_the_paddle_s_colour_is_refused(rig):
     known = Rig.load(rig)
-    with pytest.raises(ValueError, match="paddle's colour"):
+    with pytest.raises(ValueError, match="no colour of the paddle"):
         measure_delays(Rig(**{**vars(known), "paddle": None}), 5)

@@ -140,13 +140,13 @@ def test_a_client_whose_recipes_are_forgotten_is_refused():
     with emulator():
         before = status()["pose"]
         switch("forgotten_recipes", "--address", ADDRESS)
-        with pytest.raises(RobotError, match="program did not start"):
+        with pytest.raises(RobotError, match="control script did not start"):
             Robot(CONFIG).connect()
         assert status()["pose"] == before
 
 
 def test_every_reported_fault_is_in_the_docs():
-    page = Path("docs/robot.md").read_text()
+    page = Path("docs/robot_results.md").read_text()
     rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \| ([^|]*) \|", page, re.MULTILINE)
     shown = {name: source.strip() for name, _, source in rows}
     assert {name: FAULTS[name].source for name in REPORTED} == {

@@ -73,12 +73,12 @@ def test_copies_have_readers_of_their_own(lab, rig):
 def test_a_silent_arm_is_an_error(lab, rig, fault):
     def check(world):
         fault("silent_robot")
-        with pytest.raises(RuntimeError, match="silent for"):
+        with pytest.raises(RuntimeError, match="no message for"):
             step_on(world)
 
     play(rig, 1, check)
 
 
 def test_a_missing_rig_is_named():
-    with pytest.raises(ValueError, match=r"nowhere\.json: there is no rig"):
+    with pytest.raises(ValueError, match=r"nowhere\.json: the file does not exist"):
         play("nowhere.json", 1)

@@ -118,8 +118,8 @@ def test_a_reach_beyond_the_joints_is_refused_before_anything_moves(rig, tmp_pat
         ("frozen_camera", "no frame"),
         pytest.param("silent_robot", "robot silent", marks=pytest.mark.slow),
         pytest.param("lost_puck", "not seen", marks=pytest.mark.slow),
-        ("stuck_frame", "the same picture for 0.3 s"),
-        ("repeated_frames", "pictures repeat the one before"),
+        ("stuck_frame", "the same frame for 0.3 s"),
+        ("repeated_frames", "frames repeat the one before"),
         pytest.param("second_puck", "is there a second one", marks=pytest.mark.slow),
         pytest.param("delayed_frames", "frames arrive 0.", marks=pytest.mark.slow),
     ],
@@ -171,7 +171,7 @@ def test_another_table_no_rig_and_a_wild_driver_are_refused(rig):
     [
         ("moved_camera", "calibrate again"),
         ("dark_camera", "are the lights on"),
-        ("second_puck", "2 things have the puck's colour"),
+        ("second_puck", "2 objects have the puck's colour"),
     ],
 )
 def test_what_is_wrong_with_the_picture_is_noticed_first(rig, fault, name, words):

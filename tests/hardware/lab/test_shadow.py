@@ -48,7 +48,7 @@ def test_the_hand_is_where_it_is(lab, hand):
         lab.ask(AWAY)
         time.sleep(0.6)
         assert seen.read() is None
-        assert "not in the picture" in seen.trouble
+        assert "not in the image" in seen.trouble
 
 
 def play(agent, steps, check=lambda world, k: None):
@@ -117,9 +117,13 @@ def test_copies_have_cameras_of_their_own(lab, hand):
 
 @pytest.mark.slow
 def test_another_rig_and_a_moved_camera_are_named(lab, hand, rig, tmp_path):
-    with pytest.raises(ValueError, match="the rig of a table, expected that of a hand"):
+    with pytest.raises(
+        ValueError, match="the rig of a table, expected the rig of a hand"
+    ):
         ah.make_driver(f"shadow:rig={rig}")
-    with pytest.raises(ValueError, match="the rig of a hand, expected that of a table"):
+    with pytest.raises(
+        ValueError, match="the rig of a hand, expected the rig of a table"
+    ):
         Rig.load(hand)
     with pytest.raises(ValueError, match="calibrate --hand"):
         ah.make_driver(f"shadow:rig={tmp_path / 'none.json'}")

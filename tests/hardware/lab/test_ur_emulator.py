@@ -263,12 +263,15 @@ def test_a_dropped_connection_is_refused_until_it_is_over():
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (["--address", "10.0.0.1"], "is no loopback address"),
+        (["--address", "10.0.0.1"], "expected a loopback address"),
         (["--fault", "fire@3s"], "unknown fault 'fire'"),
         (["--fault", "silent_robot"], "expected NAME@3s"),
         (["--fault", "silent_robot@3s-2s"], "must end after it begins"),
         (["--polyscope", "old"], "expected a version"),
-        (["fault", "silent_robot", "--address", "127.0.0.99"], "none is running"),
+        (
+            ["fault", "silent_robot", "--address", "127.0.0.99"],
+            "no emulator is running",
+        ),
     ],
 )
 def test_bad_input_is_named(words, reason):

@@ -113,7 +113,7 @@ def test_whoever_withdraws_is_erased_and_leaves_no_gap(plan, tmp_path):
     code = stage(study, second)["code"]
     (found,) = diaries(out)
     assert found.number == 0
-    with pytest.raises(ValueError, match="nothing of 'xyz'"):
+    with pytest.raises(ValueError, match="no data of 'xyz'"):
         erase(out, "xyz")
     assert erase(out, code) > 2
     assert not list(diaries(out))

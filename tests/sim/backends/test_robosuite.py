@@ -344,7 +344,7 @@ def test_arms_differ_from_world_to_world():
     stiff = [world.views.gains[0, 0] for world in arms.backend.worlds]
     np.testing.assert_allclose(stiff, arms.episode.physics["arm_stiffness"])
     assert len(set(stiff)) == 4
-    with pytest.raises(ValueError, match=r"'arm_force'. is of arms.*backend='robos"):
+    with pytest.raises(ValueError, match=r"'arm_force'. needs a.*backend='robos"):
         ah.make_world("juggle", backend="numba", physics={"arm_force": 30.0})
 
 

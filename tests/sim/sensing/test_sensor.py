@@ -230,5 +230,5 @@ def test_needs_are_collected_from_all_forms():
     assert Needs.of(["velocity", "history"]) == Needs(history=True, estimate=False)
     assert Needs.of(["estimate"]) == Needs(history=True, estimate=True)
     world = ah.make_world("juggle", 1)
-    with pytest.raises(ValueError, match="'history' cannot be read here"):
+    with pytest.raises(ValueError, match="'history' is not one of"):
         world.observer.layout_of("history")

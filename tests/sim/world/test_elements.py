@@ -129,7 +129,7 @@ def test_what_cannot_be_is_refused():
     with pytest.raises(ValueError, match=r"obstacles.*served"):
         ah.make_world("duel", options={"obstacles": [[0.0, 0.05, 0.02]]})
     world = ah.make_world("touch", options={"obstacles": [[0.6, 0.0, 0.29]]})
-    with pytest.raises(ValueError, match=r"obstacles.*no room"):
+    with pytest.raises(ValueError, match=r"obstacles.*no space"):
         world.reset(0)
 
 

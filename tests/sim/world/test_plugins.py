@@ -85,10 +85,10 @@ def test_a_class_or_an_object_is_a_scenario():
     [
         ("nowhere.py", "no such file"),
         ("broken.py", "cannot be imported: ModuleNotFoundError"),
-        ("empty.py", "expected one class below Driver, found none"),
+        ("empty.py", "expected one subclass of Driver, found none"),
         ("my_driver.py:Pull", "has no 'Pull'"),
         ("stricker:weak", "unknown driver 'stricker:weak' .did you mean 'striker'"),
-        ("json:dumps", "dumps is no player of this environment"),
+        ("json:dumps", "dumps cannot act in this environment"),
     ],
 )
 def test_a_driver_that_is_not_there_is_refused_in_words(folder, name, message):
@@ -97,15 +97,15 @@ def test_a_driver_that_is_not_there_is_refused_in_words(folder, name, message):
 
 
 def test_code_that_is_no_scenario_is_refused(folder):
-    with pytest.raises(ValueError, match="is no scenario; give a class"):
+    with pytest.raises(ValueError, match="is not a scenario; expected a subclass"):
         ah.make_world("my_driver:Push")
-    with pytest.raises(ValueError, match="give them to the scenario object"):
+    with pytest.raises(ValueError, match="set them in the scenario object"):
         find_scenario(Reach(), seconds=5.0)
 
 
 def test_a_plan_of_a_study_runs_no_code(folder):
     for name in ("my_driver.py", "my_driver:Push", "my_driver:Push:share=1"):
-        with pytest.raises(ValueError, match="runs no code"):
+        with pytest.raises(ValueError, match="cannot run Python code"):
             Opponent(name)
 
 

@@ -177,13 +177,13 @@ def test_a_bad_memory_is_named():
 @pytest.mark.parametrize(
     ("worlds", "words"),
     [
-        ([0, 7], "there is no world 7, only 3"),
+        ([0, 7], "there is no world 7; the batch has 3"),
         ([-1], "there is no world -1"),
         ([True, False], "expected indices"),
         ([0.0], "expected indices"),
         (1, "expected indices"),
         ([], "expected indices"),
-        ([1, 1], "names one twice"),
+        ([1, 1], "contains an index twice"),
     ],
 )
 def test_worlds_that_are_none_are_named(worlds, words, backend):
@@ -230,7 +230,7 @@ def test_environments_take_states_too():
         np.testing.assert_array_equal(seen[agent], again[agent])
     with pytest.raises(ValueError, match="unknown reset option 'stat'"):
         env.reset(options={"stat": state})
-    with pytest.raises(ValueError, match="a memory needs its state"):
+    with pytest.raises(ValueError, match="a memory needs a state"):
         env.reset(options={"memory": memory})
     vec = ah.make_vec("juggle", 3)
     vec.reset(seed=0)
@@ -263,7 +263,7 @@ def test_environments_take_states_too():
         ("duel", {"paddle_0": (-0.1, -0.06)}, None),
         ("duel", {"puck_0": (0.83, 0.1)}, None),
         ("move_block", {"block_0": (0.0, 1.0)}, "block_0 is off the table"),
-        ("free_for_all", {"paddle_2": (0.0, 0.0)}, "paddle_2 is out of the reach"),
+        ("free_for_all", {"paddle_2": (0.0, 0.0)}, "paddle_2 is outside the workspace"),
     ],
 )
 def test_a_body_is_on_the_table_in_its_reach_and_apart(name, bodies, words, backend):
@@ -331,7 +331,9 @@ def test_states_of_paddles_that_are_moved_from_outside_can_be_set(backend):
     if backend == "numba":
         assert jammed > 3, "no puck was jammed by more than 2 cm"
     moved[0, 0] = np.inf
-    with pytest.raises(ValueError, match="prescribed: no element may be infinite"):
+    with pytest.raises(
+        ValueError, match="position-driven seat: no element may be infinite"
+    ):
         world.step(np.zeros((16, 2, 2)), moved)
 
 

@@ -1,1 +1,1 @@
-"""Laws of the 2D table that the 2D backends share."""
+"""Physics of the 2D table that the 2D backends share."""

@@ -1,4 +1,4 @@
-"""Overlaps of discs that a solver with substeps leaves where there is no room."""
+"""Separation of overlapping discs that a solver with substeps cannot separate."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.types import Array
 
 SLOP = 2e-4
-"""Overlap that is left alone (m)."""
+"""Largest overlap that is not corrected, m."""
 PUSHES = 6
-"""Number of sweeps in which pucks alone give way; then paddles do."""
+"""Number of sweeps in which only pucks move; then paddles move, too."""
 
 
 @compiled()
@@ -26,21 +26,22 @@ def give_way(
     lines: Array,
     posts: Array,
 ) -> bool:
-    """Move discs apart: pucks give way first, then paddles, which stop there.
+    """Separate overlapping discs: pucks yield first, then paddles, which stop.
 
     Args:
-        position: of paddles and pucks (N, 2), m, changed.
-        velocity: of paddles (paddles, 2), m/s; what closes is taken from those that
-            give way.
-        radius: (N,) m.
-        paddles: number of paddles.
-        holds: (paddles,) bool: does not give way.
-        absent: (N,) bool: touches nothing.
-        lines: `walls.sides`.
-        posts: (obstacles, 5) both ends, and the distance that centres of pucks keep, m.
+        position: Positions of paddles and pucks (N, 2), table frame, m, changed.
+        velocity: Velocities of paddles (paddles, 2), table frame, m/s, changed. A
+            paddle that yields loses its closing speed.
+        radius: Radii of paddles and pucks (N,), m.
+        paddles: Number of paddles.
+        holds: True for paddles that do not yield (paddles,).
+        absent: True for bodies that touch nothing (N,).
+        lines: Sides of the table (sides, 6), see `walls.sides`.
+        posts: Obstacles (obstacles, 5): both ends, and the smallest distance of a
+            puck's centre, m.
 
     Returns:
-        True if anything moved.
+        True if a body moved.
     """
     moved = False
     for sweep in range(40):
@@ -70,7 +71,7 @@ def give_way(
                 if absent[i] or deep <= 0.0 or gap == 0.0:
                     continue
                 deepest, nx, ny = max(deepest, deep), nx / gap, ny / gap
-                # The first body gives way by this share of the overlap.
+                # Share of the overlap by which the first body moves.
                 share = 0.5 if i >= paddles else 0.0
                 if i < paddles and sweep >= PUSHES and not holds[i]:
                     share = 1.0

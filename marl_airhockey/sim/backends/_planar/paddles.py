@@ -20,20 +20,21 @@ def follow(
     imposed: Array,
     raised: Array,
 ) -> None:
-    """Compute the velocities of paddles, and which are prescribed or raised.
+    """Compute the velocities of paddles, and which are position-driven or raised.
 
     Args:
-        velocity: (B, paddles, 2) commanded, m/s.
-        prescribed: (B, paddles, 4) position and velocity at the end of the step, nan
-            for paddles that follow their command.
-        above: (B, paddles) bool: commanded to be raised.
-        position: (B, N, 2) m, paddles first.
-        dt: length of the step, s.
-        goal: (B, paddles, 2) m/s at the end of the step, filled; that of a prescribed
-            paddle holds during the whole step.
-        imposed: (B, paddles) bool, filled: True if prescribed.
-        raised: (B, paddles) bool, filled: True above the table, where it touches
-            nothing: as commanded, or prescribed faster than `MAX_PRESCRIBED_SPEED`.
+        velocity: Commanded velocities (B, paddles, 2), table frame, m/s.
+        prescribed: Positions and velocities of position-driven paddles at the end of
+            the step (B, paddles, 4), table frame, m and m/s; nan for all others.
+        above: True for paddles that are commanded to be raised (B, paddles).
+        position: Positions (B, N, 2), paddles first, table frame, m.
+        dt: Length of the step, s.
+        goal: Velocities at the end of the step (B, paddles, 2), m/s, filled. A
+            position-driven paddle has its velocity during the whole step.
+        imposed: True for position-driven paddles (B, paddles), filled.
+        raised: True for paddles above the table, which touch nothing (B, paddles),
+            filled. These are commanded to be raised, or position-driven and faster
+            than `MAX_PRESCRIBED_SPEED`.
     """
     for b in range(len(goal)):
         for i in range(goal.shape[1]):
@@ -61,18 +62,19 @@ def ramp_paddles(
     diameter: float,
     mean: Array,
 ) -> bool:
-    """Move paddles by a substep of their linear ramps, in place.
+    """Move paddles by a substep of their linear velocity ramps, in place.
 
     Args:
-        position: (paddles, 2) m.
-        velocity: (paddles, 2) m/s.
-        goal: (paddles, 2) m/s after the ``left`` remaining substeps.
-        prescribed: (paddles,) bool: moves at its goal velocity and does not yield.
-        raised: (paddles,) bool: touches nothing.
-        left: number of remaining substeps of the ramp.
-        dt: length of a substep, s.
-        diameter: distance of two centres in contact, m.
-        mean: (paddles, 2) m/s, filled with the mean velocity within the substep.
+        position: Positions (paddles, 2), table frame, m, changed.
+        velocity: Velocities (paddles, 2), table frame, m/s, changed.
+        goal: Velocities after the ``left`` remaining substeps (paddles, 2), m/s.
+        prescribed: True for position-driven paddles, which move at their goal velocity
+            and do not yield (paddles,).
+        raised: True for paddles that touch nothing (paddles,).
+        left: Number of remaining substeps of the ramp.
+        dt: Length of a substep, s.
+        diameter: Distance of two centres in contact, m.
+        mean: Mean velocities within the substep (paddles, 2), m/s, filled.
 
     Returns:
         True if any pair overlapped.
@@ -98,16 +100,16 @@ def separate_paddles(
 ) -> bool:
     """Separate overlapping paddles in place; return True if any pair overlapped.
 
-    Each is moved back by half of the overlap and both take the mean of their normal
-    velocities. A prescribed paddle does not yield: the other is moved back by all of
-    it and takes the prescribed one's normal velocity.
+    Each paddle moves back by half of the overlap, and both get the mean of their normal
+    velocities. A position-driven paddle does not yield. The other paddle moves back by
+    the whole overlap and gets the normal velocity of the position-driven one.
 
     Args:
-        position: (paddles, 2) m, changed in place.
-        velocity: (paddles, 2) m/s, changed in place.
-        prescribed: (paddles,) bool.
-        raised: (paddles,) bool: touches nothing.
-        diameter: distance of two centres in contact, m.
+        position: Positions (paddles, 2), table frame, m, changed.
+        velocity: Velocities (paddles, 2), table frame, m/s, changed.
+        prescribed: True for position-driven paddles (paddles,).
+        raised: True for paddles that touch nothing (paddles,).
+        diameter: Distance of two centres in contact, m.
     """
     overlap = False
     for i in range(len(prescribed) - 1):
@@ -148,14 +150,14 @@ def separate_paddles(
 def keep_in_reach(
     position: Array, velocity: Array, held: Array, normals: Array, offsets: Array
 ) -> bool:
-    """Move paddles back to the edges of their reaches, where they stop.
+    """Move paddles back to the edges of their workspaces, where they stop.
 
     Args:
-        position: (paddles, 2) m, changed in place.
-        velocity: (paddles, 2) m/s, changed in place.
-        held: (paddles,) bool: the reach counts.
-        normals: `core.seat.reaches` (paddles, K, 2), like the next.
-        offsets: (paddles, K) m.
+        position: Positions (paddles, 2), table frame, m, changed.
+        velocity: Velocities (paddles, 2), table frame, m/s, changed.
+        held: True for paddles that the workspace limits (paddles,).
+        normals: Inward normals of the edges (paddles, K, 2), see `core.seat.reaches`.
+        offsets: Offsets of the edges (paddles, K), m, see `core.seat.reaches`.
 
     Returns:
         True if any paddle was outside.

@@ -1,4 +1,4 @@
-"""Walls of backends: their lines, and how deep a disc is in them."""
+"""Walls of backends: the lines of the sides, and the overlap of a disc with them."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from marl_airhockey.types import Array
 
 
 def sides(scene: Scene) -> Array:
-    """Return the sides of a scene's table (sides, 6), in the form for compiled code.
+    """Return the sides of a scene's table (sides, 6) for compiled code, table frame.
 
-    A row holds the inward normal, the side's distance from the origin, its middle, and
-    half the width of the goal line in it (0 for none), in metres.
+    A row contains the inward normal, the distance of the side from the origin, its
+    middle, and half the width of its goal line (0 without one). Lengths are in m.
     """
     table, rows = scene.table, []
     for side, (normal, offset) in enumerate(
@@ -28,7 +28,7 @@ def sides(scene: Scene) -> Array:
 
 @compiled()
 def depth_in_side(lines: Array, s: int, radius: float, x: float, y: float) -> float:
-    """Return how deep a disc is in the wall of side ``s`` of `sides`, m."""
+    """Return the overlap of a disc with the wall of side ``s`` of `sides`, m."""
     nx, ny = lines[s, 0], lines[s, 1]
     if abs(nx * (y - lines[s, 4]) - ny * (x - lines[s, 3])) < lines[s, 5]:
         return -np.inf

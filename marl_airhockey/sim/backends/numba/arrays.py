@@ -1,4 +1,4 @@
-"""Arrays of the kernel: table, commands, motion, events, coefficients."""
+"""Arrays of the kernel: table, commands, states, events and coefficients."""
 
 from __future__ import annotations
 
@@ -18,16 +18,22 @@ PUCK_E, PUCK_MU, BLOCK_E = range(9, 12)
 PUCK_MASS, BLOCK_MASS, BLOCK_GRIP, PULL, STEP_TIME = range(12, 17)
 WALL_E_SD, WALL_EXIT_SD, PADDLE_E_SD, SPIN_SD = range(17, 21)
 COEFFICIENTS = 21
-"""Columns of a world's coefficients: acceleration by the slope (m/s2), linear (1/s) and
-quadratic drag (1/m); restitution at walls, its loss per ln(m/s), and friction there;
-restitutions and frictions of paddles and pucks, restitution of blocks; masses (kg),
-deceleration of sliding blocks, the size of the slope's acceleration (m/s2), and the
-time without linear drag for the way that a puck goes in a control step with it (s);
-and the scatter of `core.scatter`."""
+"""Columns of a world's coefficients.
+
+- Acceleration by the slope along x and y (m/s2), linear drag (1/s), quadratic drag
+  (1/m).
+- Walls: restitution, its loss per ln(m/s), friction.
+- Paddles: restitution, friction. Pucks: restitution, friction. Blocks: restitution.
+- Masses of pucks and blocks (kg), deceleration of sliding blocks by friction (m/s2),
+  and norm of the acceleration by the slope (m/s2).
+- Time in which a puck without linear drag travels as far as in a control step with it
+  (s).
+- Standard deviations of the contact noise, see `core.scatter`.
+"""
 
 
 def make_coefficients(values: dict[str, Array], control_dt: float) -> Array:
-    """Return (B, COEFFICIENTS) from physical parameters (B,)."""
+    """Return coefficients (B, COEFFICIENTS) from physical parameters (B,) by name."""
     names = (
         *("puck_damping", "puck_drag", "wall_restitution", "wall_restitution_slope"),
         *("wall_friction", "paddle_restitution", "paddle_friction"),
@@ -47,20 +53,21 @@ def make_coefficients(values: dict[str, Array], control_dt: float) -> Array:
 
 NORMAL_X, NORMAL_Y, OFFSET, MIDDLE_X, MIDDLE_Y, SIGN, HALF = range(7)
 """Columns of a wall: inward normal, distance of its line from the origin (m), middle of
-its side (m), and the part of the line that is wall: where the distance along it from
-the middle, times ``SIGN``, is at least ``HALF`` (m; -inf for all of the line)."""
+its side (m), and two columns for the part of the line that is wall. A point of the line
+is wall if its signed distance from the middle, times ``SIGN``, is at least ``HALF``
+(m). ``HALF`` is -inf if the whole line is wall."""
 
 
 def make_walls(scene: Scene) -> tuple[Array, Array, Array, int]:
-    """Return the walls of a scene: one per side, or two beside an open goal line.
+    """Return the walls of a scene: one for each side, or two next to an open goal line.
 
-    The edges of the seats' reaches come first, E of each seat, which hold its paddle
-    alone.
+    The first walls are the edges of the workspaces, E for each of the S seats. An edge
+    limits only the paddle of its seat. The other F walls are sides of the table.
 
     Returns:
-        Walls (S E + F, 7), the sides that they belong to (S E + F,), -1 for edges, for
-        each goal line (M, 2) its side and the first of its two walls, -1 where the line
-        is a whole side, and E.
+        Four values: walls (S E + F, 7); side of each wall, -1 for edges (S E + F,); for
+        each goal line its side and the index of the first of its two walls, -1 if the
+        line is a whole side (M, 2); and E.
     """
     table = scene.table
     normals, offsets = reaches(table, scene.seats)
@@ -84,40 +91,40 @@ def make_walls(scene: Scene) -> tuple[Array, Array, Array, int]:
 
 
 class Static(NamedTuple):
-    """Static side that all worlds of a batch share."""
+    """Static values that all worlds of a batch share."""
 
     paddles: int
     pucks: int
     blocks: int
     radius: Array
-    """Radii of the bodies (N,), m"""
+    """Radii of the bodies (N,), m."""
     walls: Array
-    """Walls (S E + F, 7): see `make_walls`, like the next three"""
+    """Walls (S E + F, 7); `make_walls` returns this field and the next three."""
     wall_side: Array
     goal_lines: Array
     edges: int
     obstacles: Array
-    """Obstacles (O, 5): x, y of both ends of a segment, and the radius around it, m"""
+    """Obstacles (O, 5): x, y of both ends of a segment, and the radius around it, m."""
     control_dt: float
-    """Length of a control step, s"""
+    """Length of a control step, s."""
 
 
 class Commands(NamedTuple):
     """Commands to the paddles of B worlds in a step."""
 
     goal: Array
-    """Velocity at the end of the step, or during all of it if prescribed
-    (B, paddles, 2), m/s"""
+    """Velocities at the end of the step; during the whole step if position-driven
+    (B, paddles, 2), table frame, m/s."""
     prescribed: Array
-    """True if the paddle moves at its velocity and does not yield (B, paddles)"""
+    """True for position-driven paddles, which do not yield (B, paddles)."""
     raised: Array
-    """True if the paddle touches nothing (B, paddles)"""
+    """True for paddles that touch nothing (B, paddles)."""
     closed: Array
-    """True if the goal line is wall (B, M)"""
+    """True for goal lines that are wall (B, M)."""
 
 
 class Previous(NamedTuple):
-    """State before the step, read-only; names as in `State`."""
+    """State before the step, read-only; the names are those of `State`."""
 
     position: Array
     velocity: Array
@@ -128,7 +135,7 @@ class Previous(NamedTuple):
 
 
 class Result(NamedTuple):
-    """State after the step, filled; names as in `State`, but for the last three."""
+    """State after the step, filled; `State` defines all names but the last three."""
 
     position: Array
     velocity: Array
@@ -143,15 +150,15 @@ class Result(NamedTuple):
     crossed_velocity: Array
     lifted: Array
     path: Array
-    """Columns x, y, vx, vy (B, moments + 1, movers, 4), or (B, 0, movers, 4) if the
-    scene does not require it"""
+    """Columns x, y, vx, vy (B, moments + 1, movers, 4); (B, 0, movers, 4) if the scene
+    does not require a path."""
     against: Array
-    """True if the puck touches the wall of that side (B, pucks, sides); persists"""
+    """True if the puck touches the wall of the side (B, pucks, sides); persists."""
     out: Array
-    """True if the puck is out of play (B, pucks); persists"""
+    """True for pucks out of play (B, pucks); persists."""
     pinned: Array
-    """Time for which a prescribed paddle has left the puck no room (B, pucks), s;
-    persists"""
+    """Time for which a position-driven paddle has pinned the puck (B, pucks), s;
+    persists."""
 
 
 class Batch(NamedTuple):
@@ -159,11 +166,11 @@ class Batch(NamedTuple):
 
     static: Static
     coefficients: Array
-    """Coefficients of the laws (B, COEFFICIENTS)"""
+    """Coefficients of the physics (B, COEFFICIENTS)."""
     commands: Commands
     previous: Previous
     result: Result
     keys: Array
-    """Keys of the worlds' scatter (B,)"""
+    """Keys of the contact noise of the worlds (B,)."""
     collisions: Array
-    """Number of collisions since they were set (B,)"""
+    """Number of collisions since the key was set (B,)."""

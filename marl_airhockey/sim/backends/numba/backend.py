@@ -1,4 +1,4 @@
-"""Numba backend: the 2D table, one world or thousands, in one compiled loop."""
+"""Numba backend: the 2D table in one compiled loop, for one world or thousands."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from marl_airhockey.types import Array
 
 
 class NumbaBackend(Backend):
-    """Backend with B worlds as rows of arrays, stepped by compiled `kernel.advance`."""
+    """Backend with B worlds as rows of arrays, which `kernel.advance` steps."""
 
     timestep: ClassVar[float | None] = None
 
@@ -65,9 +65,9 @@ class NumbaBackend(Backend):
     @classmethod
     def supports(cls, scene: Scene) -> str | None:
         if scene.blocks and scene.block_shape != "disc":
-            return 'square blocks are played by backend "pymunk"'
+            return 'square blocks are not supported; use the backend "pymunk"'
         if scene.blocks and any(line.width for line in scene.goal_lines):
-            return "blocks could slide into a goal; leave out one or the other"
+            return "blocks could slide into a goal; remove the blocks or the goals"
         return None
 
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:

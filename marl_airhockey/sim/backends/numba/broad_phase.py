@@ -1,4 +1,4 @@
-"""Broad phase: the pairs that can meet in a while; no others are looked at."""
+"""Broad phase: lists of the pairs that can come into contact within a time."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from marl_airhockey.sim.jit.cache import inner
 from marl_airhockey.types import Array
 
 BOW = 3e-4
-"""Distance of a curved way from its chord that a move may have (m)."""
+"""Largest distance between a curved path and its chord in a move, m."""
 
 
 @inner(error_model="numpy", forceinline=True)
@@ -46,26 +46,27 @@ def list_pairs(
     left: float,
     near: Array,
 ) -> int:
-    """List the pairs that can meet in what is left of the step.
+    """List the pairs that can come into contact in the rest of the step.
 
-    A ramp is a parabola, which lies between its control points. Drag of any form keeps
-    a puck on v F + g H, where 0 <= F <= T and 0 <= H <= T2 / 2. So a body comes no
-    nearer to an object than the nearest of these points, projected on the line to the
-    object at first, less the distance of its fall.
+    The path of a velocity ramp is a parabola, which lies between its control points.
+    With drag of any form, the displacement of a puck is v F + g H, where
+    0 <= F <= T and 0 <= H <= T2 / 2. The smallest distance from a body to an object
+    follows from the nearest of these points, projected on the initial line to the
+    object. The distance of the fall is subtracted.
 
     Args:
-        m: bodies (N, BODY); `REACH` and `BEND` are filled.
-        role: roles (N,).
-        row: coefficients of the world.
-        walls: walls.
-        obstacles: obstacles.
-        held: see `fixed_range`, like the next.
-        edges: of each paddle's reach.
-        left: s.
-        near: bodies of each pair (size, 2), filled; fixed object f is -1 - f.
+        m: Bodies (N, BODY); `REACH`, `BEND`, `FALL` and the displacements are filled.
+        role: Roles of the bodies (N,).
+        row: Coefficients of the world (COEFFICIENTS,).
+        walls: Walls, see `arrays.make_walls`.
+        obstacles: Obstacles (O, 5), see `arrays.Static`.
+        held: Number of edges of all workspaces, which are the first walls.
+        edges: Number of edges of one workspace.
+        left: Rest of the step, s.
+        near: Bodies of each pair (size, 2), filled; the fixed object f is -1 - f.
 
     Returns:
-        The number of pairs.
+        Number of pairs.
     """
     pull = row[PULL]
     for i in range(len(m)):
@@ -118,7 +119,7 @@ def list_near_drift(
     h: float,
     near: Array,
 ) -> int:
-    """List the pairs that can meet in h s at the mean velocities of a move."""
+    """List the pairs that can come into contact in h s at the mean velocities."""
     count, fixed = 0, len(walls) + len(obstacles)
     for j in range(len(m)):
         low, high = fixed_range(m, role, j, held, edges, fixed)
@@ -134,11 +135,11 @@ def list_near_drift(
 
 @inner(error_model="numpy", forceinline=True)
 def longest_move(m: Array, role: Array, near: Array, count: int) -> float:
-    """Return the longest move whose chords are true to `BOW`, s."""
+    """Return the longest move, s, in which paths differ from chords by up to `BOW`."""
     bend = 0.0
     for k in range(count):
         i, j = near[k, 0], near[k, 1]
-        # A ramp that ends within a reach lies in it, and so do its chords.
+        # A ramp that ends in a workspace stays in it, and so do its chords.
         if i >= 0:
             bend = max(bend, m[i, BEND] + m[j, BEND])
         elif role[j] > PRESCRIBED:

@@ -1,4 +1,4 @@
-"""Linear complementarity problems: which of some contacts push, and how hard."""
+"""Linear complementarity problems: the impulses of contacts that only push."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ from marl_airhockey.sim.jit.cache import inner
 from marl_airhockey.types import Array
 
 SMALL = 1e-11
-"""Number that is none, of problems whose numbers are about 1"""
+"""Number that counts as 0, in problems whose numbers are about 1."""
 ERROR = 1e-8
-"""Most by which an element of w may be below 0"""
+"""Largest amount by which an element of w may be below 0."""
 
 
 @inner(error_model="numpy")
 def complement(tableau: Array, names: Array, n: int) -> bool:
     """Find z >= 0 with w = M z + q >= 0 and w z = 0, by Lemke's method.
 
-    For a positive semi-definite M it ends with a solution if there is one (Cottle, Pang
-    and Stone, The Linear Complementarity Problem, 1992, chapter 4.4).
+    If M is positive semi-definite and there is a solution, the method finds it (Cottle,
+    Pang and Stone, The Linear Complementarity Problem, 1992, chapter 4.4).
 
     Args:
-        tableau: (n or more, n + 2): M, a column of ones and q; changed. The solution is
-            in the column 0: z.
-        names: work space (2 n + 1 or more,).
-        n: number of unknowns.
+        tableau: Array (n or more, n + 2) of M, a column of ones and q, changed. The
+            solution z is in column 0.
+        names: Work space (2 n + 1 or more,).
+        n: Number of unknowns.
 
     Returns:
         True if a solution was found.
     """
-    # Rows are variables as sums of those of the columns and the last number. Variables
-    # are w: 0 to n - 1, z: n to 2 n - 1, and an auxiliary one, 2 n.
+    # A row is a variable as the sum of the column variables and the last number. The
+    # variables are w: 0 to n - 1, z: n to 2 n - 1, and an auxiliary variable, 2 n.
     auxiliary, last = 2 * n, n + 1
     worst, row, column = -SMALL, -1, n
     for k in range(n):
@@ -59,16 +59,16 @@ def complement(tableau: Array, names: Array, n: int) -> bool:
             tableau[names[k] - n, 0] = max(tableau[k, last], 0.0)
         elif names[k] == auxiliary:
             error = tableau[k, last]
-    # Redundant contacts may end the search with next to nothing left.
+    # With redundant contacts, the search may end with a small error.
     return error < ERROR
 
 
 @inner(error_model="numpy")
 def _first_to_vanish(tableau: Array, names: Array, column: int, n: int) -> int:
-    """Return the row that is 0 first as a column's variable grows; -1 for none.
+    """Return the row that is 0 first if a column's variable grows; -1 for none.
 
-    Of several, that of the auxiliary variable, which ends the search, or else that of
-    the largest coefficient.
+    Of several rows it is the row of the auxiliary variable, which ends the search, or
+    else the row with the largest coefficient.
     """
     least = np.inf
     for k in range(n):

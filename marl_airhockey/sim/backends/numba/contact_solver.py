@@ -1,7 +1,8 @@
-"""Contact solver: impulses without restitution at all contacts of a moment, together.
+"""Contact solver: impulses at all contacts of a moment, solved together.
 
-They are the least that let nothing in contact close (Gauss' principle): a contact that
-pushes neither closes nor parts, one that does not push may part.
+Contacts have no restitution here. The impulses are the smallest with which no contact
+closes (Gauss' principle). A contact with an impulse neither closes nor opens. A contact
+without an impulse may open.
 """
 
 from __future__ import annotations
@@ -23,29 +24,30 @@ from marl_airhockey.sim.jit.cache import inner
 from marl_airhockey.types import Array
 
 PADDLES, ALL = range(2)
-"""Contacts that are solved: those of paddles with paddles and with the edges of their
-reaches, or all. A paddle that asks counts as much as the lightest other body."""
+"""Contacts that are solved: contacts of paddles with paddles and with the edges of
+their workspaces, or all contacts. A paddle with the role `ASKS` has the mass of the
+lightest other body."""
 CLOSES = 1e-6
-"""Closing speed at which what was found is no solution (m/s)."""
+"""Closing speed from which on a result is not a solution, m/s."""
 
 
 @inner(error_model="numpy")
 def push(
     m: Array, role: Array, at: int, pairs: Array, contacts: Array, n: int, who: int
 ) -> bool:
-    """Change velocities by the least pushes that let nothing close.
+    """Change velocities by the smallest impulses with which no contact closes.
 
     Args:
-        m: bodies (N, BODY), changed.
-        role: roles (N,).
-        at: column of the velocities that change.
-        pairs: bodies of each contact (n or more, 2).
-        contacts: (n or more, CONTACT).
-        n: number of contacts.
-        who: `PADDLES` or `ALL`.
+        m: Bodies (N, BODY), changed.
+        role: Roles of the bodies (N,).
+        at: First column of the velocities that change.
+        pairs: Bodies of each contact (n or more, 2).
+        contacts: Contacts (n or more, CONTACT).
+        n: Number of contacts.
+        who: Contacts that are solved, `PADDLES` or `ALL`.
 
     Returns:
-        True if there are such pushes; if not, nothing has changed.
+        True if such impulses exist; otherwise all velocities are unchanged.
     """
     weight, lightest = np.zeros(len(m)), 0.0
     for i in range(len(m)):
@@ -55,7 +57,7 @@ def push(
     for i in range(len(m)):
         if role[i] == ASKS:
             weight[i] = lightest if lightest > 0.0 else 1.0
-    # Contacts, and what scales each to an effective mass of 1.
+    # Contacts, and factors that scale each of them to an effective mass of 1.
     which, scale, count = np.empty(n, np.int64), np.empty(n), 0
     for c in range(n):
         i, j = pairs[c, 0], pairs[c, 1]

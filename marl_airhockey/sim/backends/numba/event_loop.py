@@ -1,17 +1,20 @@
-"""Event loop: worlds in which something may meet move from contact to contact.
+"""Event loop: worlds in which contacts can occur move from contact to contact.
 
 For each such world, until its control step is over:
 
-1. pairs that can meet in the time left, where these have changed (`broad_phase`)
-2. distance and closing speed of each pair; events of contacts that begin and end
-3. bodies that overlap: move them apart, and begin again at 1 (`overlaps`)
-4. bodies that close: impulses of all contacts (`impacts`), and begin again at 1
-5. time that is safe: bounded by distances, by the curves of paths, by the path's rows
-6. move all bodies by it, or up to the first contact on the way (`time_of_impact`),
-   with contacts that press held by the least impulses (`contact_solver`)
-7. pucks that have crossed a goal line leave the game
+1. List the pairs that can come into contact in the rest of the step, if these have
+   changed (`broad_phase`).
+2. Compute distance and closing speed of each pair. Record contacts that begin and end.
+3. If bodies overlap, separate them and continue at 1 (`overlaps`).
+4. If contacts close, apply the impulses of all contacts and continue at 1 (`impacts`).
+5. Compute the time of the next move. Distances, curves of paths and the rows of the
+   recorded path limit it.
+6. Move all bodies by this time, or up to the first new contact (`time_of_impact`). The
+   smallest impulses keep existing contacts from closing (`contact_solver`).
+7. Remove pucks that have crossed a goal line from the game.
 
-What is left over after 60 rounds moves in at most 50 parts, so that the loop ends.
+After 60 rounds, the rest of the step is divided into at most 50 moves, so that the loop
+ends.
 """
 
 from __future__ import annotations
@@ -88,14 +91,14 @@ from marl_airhockey.sim.jit.pipeline import view
 from marl_airhockey.types import Array
 
 JAMMED = 3.0
-"""Factor of drifts in a jam: contacts hold, so that paths need not be as true."""
+"""Factor of moves in a jam: contacts persist, so paths can be less accurate."""
 
 
 @inner(error_model="numpy")
 def run_events(batch: Batch, active: Array, work: Array, indices: Array) -> None:
-    """Move the worlds in which something may meet, from contact to contact.
+    """Move the worlds in which contacts can occur, from contact to contact.
 
-    Each inner function is one phase; numba inlines them, which saves the reference
+    Each inner function is one phase. Numba inlines them, which saves the reference
     counts of a dozen arrays at every call.
     """
     static, coefficients, commands, previous, result, keys, collisions = batch
@@ -108,9 +111,9 @@ def run_events(batch: Batch, active: Array, work: Array, indices: Array) -> None
     crossed, crossed_velocity, lifted, path, against, out, pinned = result[9:]
     first, movers = paddles + pucks, paddles + pucks + blocks
     moments, fixed = max(path.shape[1] - 1, 1), len(shared) + len(obstacles)
-    # One world: bodies and their roles, pairs that can meet and those in contact. Views
-    # of work space that the caller owns: counting references to arrays of its own would
-    # cost a sixth of the time.
+    # Arrays of one world: bodies, their roles, pairs that can come into contact, and
+    # pairs in contact. They are views of the caller's work space. With arrays of its
+    # own, the function would need a sixth of its time to count references.
     size, at = movers * (movers + fixed), work.ctypes.data
     m = view(at, (movers, BODY), np.float64)
     at += 8 * movers * BODY
@@ -119,7 +122,7 @@ def run_events(batch: Batch, active: Array, work: Array, indices: Array) -> None
     contacts = view(at, (size, CONTACT), np.float64)
     at += 8 * size * CONTACT
     walls = view(at, (len(shared), 7), np.float64)
-    # Numba takes seconds to compile an assignment of a whole array.
+    # Numba needs seconds to compile an assignment of a whole array.
     for f in range(len(shared)):
         for column in range(shared.shape[1]):
             walls[f, column] = shared[f, column]
@@ -132,7 +135,7 @@ def run_events(batch: Batch, active: Array, work: Array, indices: Array) -> None
     visits = view(at + 8 * size * 2, (size,), np.int64)
 
     def hold(i: int) -> None:
-        # The edges of its reach matter to a paddle whose way leads beyond them.
+        # The edges of the workspace limit a paddle whose path leads beyond them.
         half, low, vx, vy = 0.5 * control_dt, i * edges, m[i, VX], m[i, VY]
         late = half * (vx + m[i, GX]), half * (vy + m[i, GY])
         way, place = (half * vx, half * vy, *late), (m[i, X], m[i, Y])
@@ -209,7 +212,7 @@ def run_events(batch: Batch, active: Array, work: Array, indices: Array) -> None
                     touching[b, j, k] = gap <= RELEASE and not out[b, k]
 
     def part(b: int, i: int, j: int, gap: float) -> None:
-        # Forget a contact that has ended.
+        # Remove a contact that has ended.
         k = j - paddles
         if gap > RELEASE and role[j] == PUCK:
             if 0 <= i < paddles:
@@ -239,7 +242,7 @@ def run_events(batch: Batch, active: Array, work: Array, indices: Array) -> None
                         crossed_velocity[b, k, g, 1] = m[j, VY]
 
     def touch(b: int, n: int, i: int, j: int, nx: float, ny: float) -> float:
-        # Note a contact with its laws and return its closing speed.
+        # Store a contact with its coefficients, and return its normal speed, m/s.
         row, kick = coefficients[b], 0.0
         speed = closing(m, VX, i, j, nx, ny)
         restitution, friction = row[PUCK_E], row[PUCK_MU]
@@ -294,7 +297,7 @@ def run_events(batch: Batch, active: Array, work: Array, indices: Array) -> None
         keep_below_the_cap()
         world = m, role, coefficients[b], walls, obstacles, held, edges
         left, rounds, moment, count = control_dt, 0, 0, 0
-        # Nothing to be taken apart before the first move.
+        # No bodies overlap before the first move.
         stale, solved, apart, bend, jam = True, False, True, 0.0, False
         while True:
             rounds += 1

@@ -1,7 +1,7 @@
-"""Flight: the worlds in which nothing can meet within a step, and their motion.
+"""Flight: motion of the worlds in which no contact can occur within a step.
 
-Worlds are taken in blocks, in which each number of all worlds lies side by side: loops
-over the worlds of a block, without branches, become vector instructions.
+Worlds are processed in blocks. In a block, the values of all worlds are adjacent in
+memory, so that loops over the worlds compile to vector instructions.
 """
 
 from __future__ import annotations
@@ -33,32 +33,32 @@ WORLDS = 64
 """Number of worlds in a block."""
 X, Y, VX, VY, EARLY_X, EARLY_Y, LATE_X, LATE_Y, FREE = range(9)
 ROWS = 9
-"""Rows of a body: position (m); velocity at the end of the step (m/s); two points that
-its way lies between, from where it is (m); 1 for a paddle that asks for its velocity
-and for a puck in play, else 0."""
+"""Rows of a body: position (m); velocity at the end of the step (m/s); two
+displacements that bound its path (m); 1 for a paddle that follows commands and for a
+puck in play, else 0."""
 DROP, ROOM, AHEAD = range(3)
-"""Rows after those of all bodies: fall of a body within the step (m); what is left of
-the room around all, below 0 if something may touch; least room of a paddle in its
-reach on its way (m)."""
+"""Rows after the rows of all bodies: fall of a body within the step (m); clearance of
+all bodies, below 0 if a contact may occur; smallest distance between the path of a
+paddle and the edges of its workspace (m)."""
 
 
 @inner(error_model="numpy")
 def block_space(movers: int) -> Array:
-    """Return the work space of `fly_freely`, owned by its caller."""
+    """Return the work space of `fly_freely`, which its caller owns."""
     return np.empty((movers + 1) * ROWS * WORLDS)
 
 
 @inner(error_model="numpy")
 def fly_freely(batch: Batch, active: Array, work: Array) -> bool:
-    """Move the worlds in which nothing can meet, and mark the others as active.
+    """Move the worlds in which no contact can occur, and mark all others as active.
 
-    The events of all worlds are cleared and their clocks advanced. The bodies of an
-    active world end where nothing would have met.
+    The events of all worlds are cleared, and their clocks advance. The bodies of an
+    active world end at positions that ignore contacts.
 
     Args:
-        batch: all arrays.
-        active: (B,) bool, filled.
-        work: `block_space`.
+        batch: Arrays of the kernel.
+        active: True for active worlds (B,), filled.
+        work: Work space, see `block_space`.
 
     Returns:
         True if any world is active.
@@ -69,7 +69,7 @@ def fly_freely(batch: Batch, active: Array, work: Array) -> bool:
         return True
     paddles, pucks, blocks = batch.static[:3]
     movers, some = paddles + pucks + blocks, False
-    # Lengths that the compiler knows tell it that rows do not overlap.
+    # With constant lengths the compiler can see that rows do not overlap.
     m = view(work.ctypes.data, (movers + 1, ROWS, WORLDS), np.float64)
     for start in range(0, len(active), WORLDS):
         count = min(WORLDS, len(active) - start)
@@ -86,7 +86,7 @@ def fly_freely(batch: Batch, active: Array, work: Array) -> bool:
 
 @inner(error_model="numpy")
 def _clear_events(batch: Batch) -> None:
-    """Advance the clocks and clear the events of the step before."""
+    """Advance the clocks and clear the events of the last step."""
     result, dt = batch.result, batch.static.control_dt
     for b in range(len(result.time)):
         result.time[b] = batch.previous.time[b] + dt
@@ -101,7 +101,7 @@ def _clear_events(batch: Batch) -> None:
 
 @inner(error_model="numpy", forceinline=True)
 def _fill(array: Array, value: float) -> None:
-    # Flat and in a loop: nested loops, and for few worlds numba's own, are slower.
+    # One flat loop: nested loops and, for few worlds, numba's own fill are slower.
     flat = array.reshape(-1)
     for i in range(len(flat)):
         flat[i] = value
@@ -148,7 +148,7 @@ def _gather(batch: Batch, start: int, count: int, m: Array) -> None:
 
 @inner(error_model="numpy", forceinline=True)
 def _find_room_at_sides(batch: Batch, count: int, m: Array) -> None:
-    """Find the room between pucks and what is fixed; see `list_pairs`."""
+    """Find the clearance between pucks and fixed objects; see `list_pairs`."""
     static = batch.static
     paddles, pucks, blocks, radius, walls = static[:5]
     obstacles, fixed = static.obstacles, len(walls) + len(static.obstacles)
@@ -171,7 +171,7 @@ def _find_room_at_sides(batch: Batch, count: int, m: Array) -> None:
 
 @inner(error_model="numpy", forceinline=True)
 def _find_room_in_reach(batch: Batch, count: int, m: Array) -> None:
-    """Find the paddles that get out of their reaches; see `stays_in_reach`."""
+    """Find the paddles that leave their workspaces; see `stays_in_reach`."""
     paddles, pucks, blocks, radius, walls = batch.static[:5]
     edges, last = batch.static.edges, paddles + pucks + blocks
     for i in range(paddles):
@@ -195,7 +195,7 @@ def _find_room_in_reach(batch: Batch, count: int, m: Array) -> None:
 
 @inner(error_model="numpy", forceinline=True)
 def _find_room_between(batch: Batch, count: int, m: Array) -> None:
-    """Find the room between bodies; see `list_pairs`."""
+    """Find the clearance between bodies; see `list_pairs`."""
     paddles, pucks, blocks, radius = batch.static[:4]
     last = paddles + pucks + blocks
     for i in range(paddles + pucks):
@@ -207,7 +207,7 @@ def _find_room_between(batch: Batch, count: int, m: Array) -> None:
                 mine = max(early, dx * m[i, LATE_X, c] + dy * m[i, LATE_Y, c])
                 early = dx * m[j, EARLY_X, c] + dy * m[j, EARLY_Y, c]
                 other = min(early, dx * m[j, LATE_X, c] + dy * m[j, LATE_Y, c])
-                # Two bodies fall less apart than one falls.
+                # The relative fall of two bodies is at most the fall of one.
                 square, least = dx * dx + dy * dy, touch + m[last, DROP, c]
                 left = square - max(mine, 0.0) + min(other, 0.0)
                 room = left * left - least * least * square if left > 0.0 else -1.0
@@ -216,7 +216,7 @@ def _find_room_between(batch: Batch, count: int, m: Array) -> None:
 
 @inner(error_model="numpy", forceinline=True)
 def _move(batch: Batch, start: int, count: int, m: Array, active: Array) -> None:
-    """Move bodies: paddles on ramps, pucks in free flight."""
+    """Move bodies: paddles along velocity ramps, pucks in free flight."""
     static, coefficients, _, previous, result = batch[:5]
     paddles, pucks, blocks, dt = *static[:3], static.control_dt
     first, last = paddles + pucks, paddles + pucks + blocks

@@ -17,18 +17,18 @@ from marl_airhockey.sim.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 NEAR = 1e-4
-"""Gap below which two bodies are in contact if they hardly close (m)."""
+"""Gap below which two bodies are in contact if they close at most at `CREEP`, m."""
 TOUCH = 1e-6
-"""Gap below which two bodies are in contact at any speed (m)."""
+"""Gap below which two bodies are in contact at any speed, m."""
 CREEP = 0.02
-"""Closing speed above which bodies must come nearer than `NEAR`, to `TOUCH` (m/s)."""
+"""Closing speed above which bodies are in contact only below `TOUCH`, m/s."""
 OUTSIDE = 1e-9
-"""Distance beyond the edge of its reach at which a paddle is outside (m)."""
+"""Distance beyond the edge of its workspace from which on a paddle is outside, m."""
 RELEASE = 1e-3
-"""Gap beyond which a contact has ended, so that the next one is a new one (m)."""
+"""Gap above which a contact has ended, so that the next contact is a new one, m."""
 
 Distance = tuple[float, float, float]
-"""Distance of a centre from the surface of a fixed object, or from another centre (m),
+"""Distance of a centre from the surface of a fixed object or from another centre, m,
 and the unit normal there."""
 
 
@@ -37,8 +37,8 @@ def in_contact(gap: float, speed: float) -> bool:
     """Return True if two bodies are in contact.
 
     Args:
-        gap: between their surfaces, m.
-        speed: at which it grows, m/s.
+        gap: Gap between their surfaces, m.
+        speed: Time derivative of the gap, m/s.
     """
     return gap < TOUCH or (gap < NEAR and speed > -CREEP)
 
@@ -54,7 +54,7 @@ def distance_to_point(dx: float, dy: float) -> Distance:
 
 @inner(error_model="numpy", forceinline=True)
 def distance_to_wall(x: float, y: float, walls: Array, f: int) -> Distance:
-    """Return the distance from wall ``f`` of `make_walls`, a convex set."""
+    """Return the distance from wall ``f`` of `make_walls`, which is a convex set."""
     nx, ny = walls[f, NORMAL_X], walls[f, NORMAL_Y]
     ahead = nx * x + ny * y + walls[f, OFFSET]
     if walls[f, HALF] == -np.inf:
@@ -64,7 +64,7 @@ def distance_to_wall(x: float, y: float, walls: Array, f: int) -> Distance:
     gap = walls[f, HALF] - sign * aside
     if gap <= 0.0:
         return ahead, nx, ny
-    # Beside the wall: its post or, behind the line, the end of the wall.
+    # Next to the wall: its post or, behind the line, the end of the wall.
     distance, across, along = distance_to_point(max(ahead, 0.0), -sign * gap)
     return distance, across * nx - along * ny, across * ny + along * nx
 
@@ -73,7 +73,7 @@ def distance_to_wall(x: float, y: float, walls: Array, f: int) -> Distance:
 def distance_to_fixed(
     x: float, y: float, f: int, walls: Array, obstacles: Array
 ) -> Distance:
-    """Return the distance from a wall or, from ``len(walls)`` on, an obstacle."""
+    """Return the distance from fixed object ``f``: walls are first, then obstacles."""
     if f < len(walls):
         return distance_to_wall(x, y, walls, f)
     o = f - len(walls)
@@ -88,9 +88,10 @@ def distance_to_fixed(
 
 @inner(error_model="numpy", forceinline=True)
 def ahead_of_mouth(x: float, y: float, walls: Array, f: int) -> float:
-    """Return the distance ahead of the open goal line beside wall ``f``, m.
+    """Return the distance ahead of the open goal line next to wall ``f``, m.
 
-    It is below 0 for a centre that has crossed, and infinite beside the opening.
+    It is below 0 for a centre that has crossed the line, and infinite for a centre next
+    to the opening.
     """
     nx, ny = walls[f, NORMAL_X], walls[f, NORMAL_Y]
     aside = nx * (y - walls[f, MIDDLE_Y]) - ny * (x - walls[f, MIDDLE_X])
@@ -109,16 +110,16 @@ def stays_in_reach(
     high: int,
     radius: float,
 ) -> tuple[bool, bool]:
-    """Return whether a paddle is within its reach, and whether its way stays there.
+    """Return True if a paddle is in its workspace, and True if its path stays there.
 
     Args:
-        x: m.
-        y: m.
-        points: two points that its way lies between, from where it is, m.
-        walls: see `make_walls`.
-        low: first edge of the reach.
-        high: the one after the last.
-        radius: of the paddle, m.
+        x: Position of the centre along x, table frame, m.
+        y: Position of the centre along y, table frame, m.
+        points: Two displacements (x, y, x, y) that bound the path, m.
+        walls: Walls, see `arrays.make_walls`.
+        low: Index of the first edge of the workspace.
+        high: Index after the last edge.
+        radius: Radius of the paddle, m.
     """
     within, ahead = np.inf, np.inf
     for f in range(low, high):
@@ -140,17 +141,17 @@ def begin_pucks(
     out: Array,
     pinned: Array,
 ) -> None:
-    """Begin with pucks in play in some worlds, and find the walls that they touch.
+    """Put all pucks into play in some worlds, and find the walls that they touch.
 
     Args:
-        worlds: (W,) indices.
-        pucks: (B, pucks, 2) m.
-        radius: of a puck, m.
-        walls: see `make_walls`, like the next.
-        wall_side: of each wall, -1 for edges of reaches.
-        against: (B, pucks, sides) bool, filled in these worlds.
-        out: (B, pucks) bool, like the next set to none.
-        pinned: (B, pucks) s.
+        worlds: Indices of the worlds (W,).
+        pucks: Positions of the pucks (B, pucks, 2), table frame, m.
+        radius: Radius of a puck, m.
+        walls: Walls, see `arrays.make_walls`.
+        wall_side: Side of each wall, -1 for edges of workspaces.
+        against: True if a puck touches a side (B, pucks, sides), filled.
+        out: True for pucks out of play (B, pucks), set to False.
+        pinned: Time for which pucks have been pinned (B, pucks), s, set to 0.
     """
     for b in worlds:
         for k in range(pucks.shape[1]):

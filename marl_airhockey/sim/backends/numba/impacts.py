@@ -1,10 +1,12 @@
 """Impacts: the solver for all contacts of a moment.
 
-Contacts are solved as impacts of two bodies, one after the other and the hardest first.
-Each conserves momentum and takes energy, so all of them do. Where that does not end
-soon, or makes a puck faster than any blow could, `pushes` solves all contacts together,
-and a paddle that asks for a velocity yields to a puck that has no room. The
-hardest-first order makes the result independent of the order of the bodies.
+Contacts are solved one after the other as impacts of two bodies, the fastest first. An
+impact conserves momentum and does not add energy. With the fastest first, the result
+does not depend on the order of the bodies.
+
+If this does not end soon, or makes a puck faster than an impact can, `contact_solver`
+solves all contacts together. A paddle that follows commands then yields to a pinned
+puck.
 """
 
 from __future__ import annotations
@@ -37,17 +39,17 @@ from marl_airhockey.sim.jit.cache import inner
 from marl_airhockey.types import Array
 
 TIMES = 4
-"""Number of times that a contact returns its restitution at one moment."""
+"""Number of impacts with restitution of one contact at one moment."""
 IMPACTS = 6
 """Number of impacts per contact before all contacts are solved together."""
 DIRECT = 2
 """Number of impacts per contact of paddles before these are solved together."""
 FAST = 0.1
-"""Closing speed from which on contacts in a jam bounce (m/s)."""
+"""Closing speed above which contacts in a jam bounce, m/s."""
 STOPS = 20
-"""Number of inelastic impacts per contact before what still closes stands still."""
+"""Number of inelastic impacts per contact before bodies that still close stop."""
 MULTIPLE = 3.0
-"""A contact leaves no puck faster than the fastest body before, times this."""
+"""Largest ratio of a puck's speed after contacts to the fastest body's speed before."""
 
 
 @inner(error_model="numpy")
@@ -62,25 +64,25 @@ def solve(
     n: int,
     jam: bool,
 ) -> bool:
-    """Change velocities so that nothing in contact closes.
+    """Change velocities so that no contact closes.
 
     Args:
-        m: bodies (N, BODY), changed.
-        role: roles (N,), changed where a prescribed paddle leaves a puck no room.
-        at: column of the velocities that change: VX or DX.
-        pairs: bodies of each contact (n or more, 2).
-        contacts: (n or more, CONTACT).
-        visits: work space (n or more,).
-        kept: work space (N, 3).
-        n: number of contacts.
-        jam: whether paddles have yielded to pucks in this step.
+        m: Bodies (N, BODY), changed.
+        role: Roles of the bodies (N,), changed if a position-driven paddle pins a puck.
+        at: First column of the velocities that change: VX or DX.
+        pairs: Bodies of each contact (n or more, 2).
+        contacts: Contacts (n or more, CONTACT).
+        visits: Work space (n or more,).
+        kept: Work space (N, 3).
+        n: Number of contacts.
+        jam: True if paddles have yielded to pucks in this step.
 
     Returns:
         True if paddles have yielded.
     """
     i, j = pairs[0, 0], pairs[0, 1]
     if n == 1 and at == VX and i < 0 and role[j] == PUCK:
-        # Most often a puck meets a wall, which one impact settles.
+        # The most frequent case, a puck at a wall, needs one impact.
         impact(m, role, at, pairs, contacts, 0, contacts[0, RESTITUTION], True)
         return jam
     top, paddle = 0.0, False
@@ -136,9 +138,9 @@ def _bounce(
     most: int,
     least: float,
 ) -> bool:
-    """Strike the contact that closes fastest, up to ``most`` times.
+    """Apply impacts to the contact that closes fastest, up to ``most`` times.
 
-    Return True if none closes faster than ``least`` m/s then.
+    Return True if no contact closes faster than ``least`` m/s afterwards.
     """
     for _ in range(most):
         c = hardest(m, role, at, pairs, contacts, n, 1, least)
@@ -152,10 +154,10 @@ def _bounce(
 
 @inner(error_model="numpy")
 def _rest(m: Array, role: Array, pairs: Array, contacts: Array, n: int) -> bool:
-    """Let nothing close in the coming move; return True if that was found.
+    """Change the velocities of the next move so that no contact closes.
 
-    A contact that has pushed does not part within the move, so that it does no work:
-    what a later push took from it, it takes back.
+    A contact with an impulse does not open within the move, so that it does no work.
+    Its impulse is reduced if later impulses make it open. Return True on success.
     """
     pushed = np.zeros(n)
     for _ in range(IMPACTS * n):
@@ -187,7 +189,7 @@ def _rest(m: Array, role: Array, pairs: Array, contacts: Array, n: int) -> bool:
 def _stop_paddles_at_paddles(
     m: Array, role: Array, at: int, pairs: Array, contacts: Array, n: int
 ) -> None:
-    """Let paddles that meet share their normal velocity."""
+    """Give paddles in contact a common normal velocity."""
     for count in range(STOPS * n):
         c = hardest(m, role, at, pairs, contacts, n, 0, TINY)
         if c < 0 or (
@@ -209,7 +211,7 @@ def _stop_paddles(
     visits: Array,
     n: int,
 ) -> None:
-    """Push what is free, without restitution, and stop paddles at what is not."""
+    """Push free bodies without restitution, and stop paddles at immovable ones."""
     for c in range(n):
         visits[c] = 0
     for count in range(2 * STOPS * n):
@@ -227,7 +229,7 @@ def _stop_paddles(
             strike(m, at, i, j, contact, shares(m, role, i, j, visits[c] > 0))
             visits[c] += 1
             continue
-        # A knot: what still closes stands still.
+        # No solution was found: stop the bodies that still close.
         for k in (i, j):
             if k >= 0 and role[k] != PRESCRIBED:
                 m[k, at] = m[k, at + 1] = 0.0

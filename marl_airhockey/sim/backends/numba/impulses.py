@@ -1,4 +1,4 @@
-"""Impulses: the law of impacts of two bodies, and the contact that closes fastest."""
+"""Impulses: the impact of two bodies, and the contact that closes fastest."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ def strike(
     contact: tuple[float, float, float, float],
     weights: tuple[float, float, float, float],
 ) -> None:
-    """Apply the impulse law to two bodies in contact.
+    """Apply the impulse of an impact to two bodies in contact.
 
-    The tangent is the normal turned by +90 degrees, spin is counter-clockwise.
+    The tangent is the normal, rotated by +90 degrees. Spin is counter-clockwise.
 
     Args:
-        m: bodies.
-        at: column of the velocities that change.
-        i: first body; below 0 for a fixed object.
-        j: second body.
-        contact: normal from i to j, restitution, friction.
-        weights: inverse masses of i and j, and of their edges.
+        m: Bodies (N, BODY), changed.
+        at: First column of the velocities that change.
+        i: Index of the first body; below 0 for a fixed object.
+        j: Index of the second body.
+        contact: Unit normal from i to j, restitution and friction (4 values).
+        weights: Inverse masses of i and j, and of their edges (4 values).
     """
     nx, ny, restitution, friction = contact
     wi, wj, ti, tj = weights
@@ -67,7 +67,7 @@ def strike(
 def scatter(
     m: Array, at: int, i: int, j: int, nx: float, ny: float, kick: float
 ) -> None:
-    """Add to a puck what its contact scatters, see `KICK`."""
+    """Add the contact noise to the motion of a puck, see `bodies.KICK`."""
     if i < 0:
         m[j, at] -= kick * ny
         m[j, at + 1] += kick * nx
@@ -87,7 +87,7 @@ def impact(
     restitution: float,
     first: bool,
 ) -> None:
-    """Strike contact ``c`` once; it scatters if that is the first time."""
+    """Apply one impact to contact ``c``, with contact noise if it is the first one."""
     i, j, nx, ny = pairs[c, 0], pairs[c, 1], contacts[c, NX], contacts[c, NY]
     contact = nx, ny, restitution, contacts[c, FRICTION]
     strike(m, at, i, j, contact, shares(m, role, i, j, False))
@@ -106,9 +106,9 @@ def hardest(
     kind: int,
     least: float,
 ) -> int:
-    """Return the contact that closes fastest, -1 if none does by ``least`` m/s.
+    """Return the contact that closes fastest; -1 if all are slower than ``least`` m/s.
 
-    ``kind`` is 0 for contacts of two paddles, 1 for all others, 2 for both.
+    ``kind`` is 0 for contacts of two paddles, 1 for all other contacts, 2 for both.
     """
     worst, found = -least, -1
     for c in range(n):

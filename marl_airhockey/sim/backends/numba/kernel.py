@@ -1,7 +1,7 @@
 """Kernel of the 2D table: one control step of B worlds in one compiled loop.
 
-A world in which nothing can meet moves in one piece (`flight`), any other one from
-contact to contact (`event_loop`).
+A world in which no contact can occur moves in one piece (`flight`). Any other world
+moves from contact to contact (`event_loop`).
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from marl_airhockey.types import Array
 
 
 def work_space(static: Static, worlds: int) -> tuple[Array, Array]:
-    """Return the work space of a kernel for B worlds, of which parts use one row.
+    """Return the work space of a kernel for B worlds.
 
-    Rows that are not used take no memory.
+    Each part of a batch uses one row. Unused rows take no memory.
     """
     movers = static.paddles + static.pucks + static.blocks
     walls = len(static.walls)
@@ -84,10 +84,10 @@ def advance(
 ) -> None:
     """Move B worlds by a control step, in place.
 
-    The arrays of a `Batch` are single arguments: numba is slow to unbox tuples of
-    arrays from Python, and Python to build them. ``command``, ``prescribed``,
-    ``closed`` and ``above`` are those of a `contracts.backend.Command`; the next three
-    are filled.
+    Each array of a `Batch` is an argument of its own, because Python is slow to build
+    tuples of arrays and numba is slow to unbox them. ``command``, ``prescribed``,
+    ``closed`` and ``above`` are the arrays of a `contracts.backend.Command`. The three
+    arguments that follow are filled.
     """
     static = Static(
         *(paddles, pucks, blocks, radius, walls, wall_side, goal_lines),

@@ -1,4 +1,4 @@
-"""Overlaps: bodies moved apart, and paddles moved back into their reaches."""
+"""Overlaps: separation of bodies, and return of paddles into their workspaces."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from marl_airhockey.types import Array
 def take_apart(
     m: Array, role: Array, walls: Array, obstacles: Array, held: int, edges: int
 ) -> None:
-    """Move overlapping bodies apart: pucks give way, then paddles that ask.
+    """Separate overlapping bodies: pucks yield first, then paddles that may yield.
 
     Args:
-        m: bodies, moved.
-        role: roles.
-        walls: walls.
-        obstacles: obstacles.
-        held: see `fixed_range`, like the next.
-        edges: of each paddle's reach.
+        m: Bodies (N, BODY), moved.
+        role: Roles of the bodies (N,); a paddle with the role `ASKS` may yield.
+        walls: Walls, see `arrays.make_walls`.
+        obstacles: Obstacles (O, 5), see `arrays.Static`.
+        held: Number of edges of all workspaces, which are the first walls.
+        edges: Number of edges of one workspace.
     """
     fixed = len(walls) + len(obstacles)
     for sweep in range(100):
         deepest = 0.0
         for j in range(len(m)):
-            # Fixed objects last, which no body is left in.
+            # Fixed objects are last, so that no body remains in one.
             low, high = fixed_range(m, role, j, held, edges, fixed)
             for place in range(j + high - low):
                 i = partner(place, j, low)
@@ -66,7 +66,7 @@ def take_apart(
 
 @inner(error_model="numpy")
 def keep_in_reach(m: Array, walls: Array, paddles: int, edges: int) -> None:
-    """Move paddles that could get out of their reaches back to the edge."""
+    """Move paddles with `HELD` back into their workspaces."""
     for j in range(paddles):
         for _ in range(100 if m[j, HELD] > 0.0 else 0):
             outside = 0.0

@@ -1,4 +1,4 @@
-"""Time of impact: the bodies of one world move up to their first contact."""
+"""Time of impact: motion of the bodies of one world up to their first contact."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ from marl_airhockey.sim.jit.cache import inner
 from marl_airhockey.types import Array
 
 REFINEMENTS = 5
-"""Number of times that the first touch is looked for, each on another chord."""
+"""Number of searches for the first touch, each with another chord."""
 WIDE = 1.7
-"""Factor of the drifts of discs that slide in a jam: they part by 0.9 mm."""
+"""Factor of the moves of discs that slide in a jam; they separate by 0.9 mm."""
 LATER = 1.1
-"""Share of a chord, a little beyond its end, up to which a touch is looked for."""
+"""Share of a chord up to which a touch is searched for, a little beyond its end."""
 
 
 @inner(error_model="numpy", forceinline=True)
@@ -84,34 +84,34 @@ def move_to_impact(
     sweeps: bool,
     jam: bool,
 ) -> tuple[float, bool, bool]:
-    """Move all bodies by at most h s, until something begins to touch.
+    """Move all bodies by at most h s, until a new contact begins.
 
-    What is in contact does not close: that is solved for the mean velocities.
+    Existing contacts do not close, because the solver changes the mean velocities.
 
     Args:
-        m: bodies (N, BODY), moved.
-        role: roles (N,).
-        row: coefficients of the world.
-        walls: walls.
-        obstacles: obstacles.
-        held: see `list_pairs`.
-        edges: see `list_pairs`.
-        goal_lines: see `Static`.
-        near: pairs that can meet (count or more, 2).
-        count: their number.
-        pairs: bodies in contact (n or more, 2).
-        contacts: their contacts.
-        visits: work space.
-        kept: work space.
-        n: number of contacts.
-        left: s of the step.
-        h: s.
-        safe: s in which nothing begins to touch.
-        sweeps: whether to end at the first touch.
-        jam: see `solve`.
+        m: Bodies (N, BODY), moved.
+        role: Roles of the bodies (N,).
+        row: Coefficients of the world (COEFFICIENTS,).
+        walls: Walls, see `arrays.make_walls`.
+        obstacles: Obstacles (O, 5), see `arrays.Static`.
+        held: Number of edges of all workspaces, which are the first walls.
+        edges: Number of edges of one workspace.
+        goal_lines: Goal lines (M, 2), see `arrays.make_walls`.
+        near: Pairs that can come into contact (count or more, 2).
+        count: Number of these pairs.
+        pairs: Bodies of each contact (n or more, 2).
+        contacts: Contacts (n or more, CONTACT).
+        visits: Work space (n or more,).
+        kept: Work space (N, 3).
+        n: Number of contacts.
+        left: Rest of the step, s.
+        h: Longest time to move, s.
+        safe: Time in which no new contact begins, s.
+        sweeps: True to end at the first touch.
+        jam: True if paddles have yielded to pucks in this step.
 
     Returns:
-        The time moved, s, True if ``near`` must be listed again, and whether
+        Three values: the time moved, s; True if ``near`` must be listed again; True if
         paddles have yielded to pucks.
     """
     stale, most, last, tried = False, h, 0.0, h
@@ -141,9 +141,9 @@ def move_to_impact(
             count = list_near_drift(m, role, *fixed, most, near)
         if h <= safe or not sweeps or attempt == REFINEMENTS - 1:
             break
-        # The chord to a touch is not the first one, so the touch may come later, too: a
-        # little, as the search does not converge for slow bodies, and not beyond what
-        # the pairs were listed for.
+        # The chord to a touch differs from the first chord, so the touch may be later.
+        # It is searched only a little later, as the search does not converge for slow
+        # bodies, and not beyond the time that the pairs were listed for.
         furthest = most / h if jam else min(most / h, LATER)
         chord = m, role, walls, obstacles, goal_lines, near, count, h
         share = _first_touch(*chord, furthest)
@@ -152,8 +152,8 @@ def move_to_impact(
             break
         error = np.log(max(share, 1e-9))
         if jam and error > 0.0 > last:
-            # Bodies that are pressed start from rest, so that their paths grow faster
-            # than the time: by the secant of both errors.
+            # Bodies under pressure start from rest, so that their paths grow faster
+            # than the time. Use the secant of both errors.
             share = max(np.exp(error * np.log(h / tried) / (last - error)), 0.1)
         last, tried = error, h
         h = min(max(h * share, 1e-9), most)
@@ -162,8 +162,8 @@ def move_to_impact(
             continue
         m[i, X] += m[i, DX] * h
         m[i, Y] += m[i, DY] * h
-        # The mean of a constant acceleration: what a contact took from the mean, it
-        # took twice from the end.
+        # With constant acceleration, a contact changes the velocity at the end by twice
+        # the change of the mean velocity.
         m[i, VX] = m[i, EX] + 2.0 * (m[i, DX] - m[i, CX])
         m[i, VY] = m[i, EY] + 2.0 * (m[i, DY] - m[i, CY])
         m[i, ANGLE] += m[i, SPIN] * h
@@ -172,9 +172,10 @@ def move_to_impact(
 
 @inner(error_model="numpy")
 def _longest_slide(m: Array, at: int, pairs: Array, contacts: Array, n: int) -> float:
-    """Return the longest move in which discs that slide on each other part by `BOW`.
+    """Return the longest move, s, in which sliding discs separate by at most `BOW`.
 
-    They part as a tangent does from its circle; ``at`` is the column of velocities.
+    The gap grows like the gap between a tangent and its circle. The first column of the
+    velocities is ``at``.
     """
     longest = np.inf
     for c in range(n):
@@ -189,7 +190,7 @@ def _longest_slide(m: Array, at: int, pairs: Array, contacts: Array, n: int) -> 
 
 @inner(error_model="numpy", forceinline=True)
 def _move_freely(m: Array, role: Array, row: Array, left: float, h: float) -> None:
-    """Fill the mean and last velocities of a move without contacts."""
+    """Fill the mean and the final velocities of a move without contacts."""
     for i in range(len(m)):
         vx, vy = m[i, VX], m[i, VY]
         if m[i, MASS] == 0.0:
@@ -223,7 +224,7 @@ def _first_touch(
 ) -> float:
     """Return the share of h s until two bodies touch or a puck crosses a goal line.
 
-    It is ``first`` where neither comes before.
+    The result is ``first`` if neither happens before.
     """
     for k in range(count):
         i, j = near[k, 0], near[k, 1]
@@ -231,7 +232,7 @@ def _first_touch(
             continue
         gap, nx, ny = distance_between(m, i, j, walls, obstacles)
         way = closing(m, DX, i, j, nx, ny) * h
-        # Distances to convex objects are convex: they fall no faster than at first.
+        # The distance to a convex object is convex: it decreases fastest at the start.
         if gap + way * first >= 0.0 or in_contact(gap, way / h):
             continue
         if i < 0:
@@ -265,8 +266,8 @@ def _touch_fixed(
 ) -> float:
     """Return the share of h s until body j touches a fixed object.
 
-    It is ``most`` or more where it does not. By Newton's method, whose steps never
-    pass the first zero of a convex function.
+    The result is at least ``most`` if the body does not touch it. Newton's method is
+    used, whose steps never pass the first zero of a convex function.
     """
     share, x, y = 0.0, m[j, DX] * h, m[j, DY] * h
     for _ in range(12):

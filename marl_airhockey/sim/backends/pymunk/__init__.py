@@ -1,4 +1,4 @@
-"""Pymunk backend: the 2D table on Chipmunk, the readable reference."""
+"""Pymunk backend: the 2D table in Chipmunk, a reference that is easy to read."""
 
 from marl_airhockey.sim.backends.pymunk.backend import make
 

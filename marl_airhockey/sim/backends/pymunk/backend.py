@@ -1,4 +1,4 @@
-"""Pymunk backend: B pymunk spaces stepped in a loop."""
+"""Pymunk backend: B pymunk spaces that a loop steps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from marl_airhockey.types import Array
 
 
 class PymunkBackend(Backend):
-    """Backend with B worlds in plain Python on Chipmunk, the reference for others."""
+    """Backend with B worlds in plain Python on Chipmunk, a reference for the others."""
 
     timestep: ClassVar[float | None] = 0.005
 
@@ -36,7 +36,7 @@ class PymunkBackend(Backend):
     @classmethod
     def supports(cls, scene: Scene) -> str | None:
         if scene.blocks and any(line.width for line in scene.goal_lines):
-            return "blocks could slide into a goal; leave out one or the other"
+            return "blocks could slide into a goal; remove the blocks or the goals"
         return None
 
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:

@@ -11,17 +11,17 @@ from marl_airhockey.types import Array
 PADDLE, PUCK, WALL, GOAL_LINE, BLOCK = 1, 2, 3, 4, 5
 """Collision types."""
 THICK = 0.5
-"""Thickness of a wall, which no body passes between two substeps (m)."""
+"""Thickness of a wall, m; no body passes it within a substep."""
 NOTHING, EVERYTHING = pymunk.ShapeFilter(mask=0), pymunk.ShapeFilter()
-"""Filters of the shapes that a shape can touch."""
+"""Filters of shapes that touch no other shape, and of shapes that touch all."""
 
 
 class SpaceBodies:
     """Bodies of a scene in a space, in the order of a `State`.
 
     Args:
-        space: space that they are added to.
-        scene: scene of the bodies.
+        space: Space that the bodies are added to.
+        scene: Scene of the bodies.
     """
 
     def __init__(self, space: pymunk.Space, scene: Scene) -> None:
@@ -30,9 +30,9 @@ class SpaceBodies:
         self.shapes: list[pymunk.Shape] = []
         """Shape of each body."""
         self.index: dict[pymunk.Shape, int] = {}
-        """Index of each shape among those of its kind."""
+        """Index of each shape among the shapes of its kind."""
         self.friction_joints: list[pymunk.Constraint] = []
-        """Friction joints of position and angle, two per block."""
+        """Friction joints of position and angle, two for each block."""
         for i in range(len(scene.seats)):
             body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
             self._add(pymunk.Circle(body, scene.table.paddle_radius), PADDLE, i)
@@ -69,22 +69,22 @@ class SpaceBodies:
 
 
 class SpaceWalls:
-    """Walls: boxes behind every side of the table, with a sensor in the gap of a goal.
+    """Walls: boxes behind every side of the table, with a sensor in each goal opening.
 
     Args:
-        space: space that they are added to.
-        scene: scene of the walls.
+        space: Space that the walls are added to.
+        scene: Scene of the walls.
     """
 
     def __init__(self, space: pymunk.Space, scene: Scene) -> None:
         self._space, self._scene = space, scene
         self.all: list[pymunk.Shape] = []
         self.plugs: dict[int, pymunk.Shape] = {}
-        """Walls that close goal lines, by goal line; they touch nothing while open."""
+        """Walls that close goal lines, by goal line; no contacts while it is open."""
         self.goal_line: dict[pymunk.Shape, int] = {}
-        """Goal line of each shape that a puck crosses by touching it."""
+        """Goal line of each shape; a puck that touches the shape crosses the line."""
         self.side: dict[pymunk.Shape, int] = {}
-        """Side of the table that each wall belongs to."""
+        """Side of the table of each wall."""
         for side in range(len(scene.table.vertices)):
             self._build_side(side)
         for obstacle in scene.obstacles:
@@ -114,12 +114,12 @@ class SpaceWalls:
                     self.goal_line[wall] = scene.goal_lines.index(line)
 
     def _build_goal(self, index: int, out: Array) -> list[Array]:
-        """Add the sensor and the plug of a goal line; return its two ends, m."""
+        """Add the sensor and the closing wall of a goal line; return its ends, m."""
         line, table = self._scene.goal_lines[index], self._scene.table
         start, end = table.ends(line.side)
         along = (end - start) / np.linalg.norm(end - start)
         middle, half = (start + end) / 2, along * (line.width or 0.0) / 2
-        # The sensor begins a radius behind the line: the centre has passed.
+        # The sensor begins one radius behind the line, where the centre has passed it.
         depth = out / THICK * table.puck_radius
         sensor = self._box(middle - half + depth, middle + half + depth, out)
         sensor.sensor, sensor.collision_type = True, GOAL_LINE

@@ -1,7 +1,7 @@
 """World of the pymunk backend: a space with paddles, pucks, blocks, walls and goals.
 
-Within a step, velocities are half a substep ahead (leapfrog), so that a puck follows
-its flight exactly but for terms of third order.
+Within a step, velocities are half a substep ahead of positions (leapfrog). The error of
+a puck's free flight is therefore of third order.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from marl_airhockey.sim.core.table import GRAVITY
 from marl_airhockey.types import Array
 
 POCKET = 100.0
-"""Coordinate of pucks out of play, far from the table (m)."""
+"""Coordinate of pucks out of play, far from the table, m."""
 ARM = 0.765
 """Mean distance of a square's points from its centre, per half of its side."""
 
@@ -42,16 +42,16 @@ class Space:
     """Space: one world in Chipmunk.
 
     Args:
-        scene: scene of the world.
-        control_dt: length of a control step, s.
-        substeps: number of physics steps in a control step.
+        scene: Scene of the world.
+        control_dt: Length of a control step, s.
+        substeps: Number of physics steps in a control step.
     """
 
     def __init__(self, scene: Scene, control_dt: float, substeps: int) -> None:
         self.scene, self.substeps, self.control_dt = scene, substeps, control_dt
         self.dt = control_dt / substeps
         self.space = space = pymunk.Space()
-        # Overlap is removed at once; resting contacts keep a tenth of a millimetre.
+        # Overlap is removed immediately; resting contacts keep 0.1 mm.
         space.collision_slop, space.collision_bias = 1e-4, 0.0
         bodies, lines = scene.bodies, len(scene.goal_lines)
         pairs, table_sides = (bodies.paddles, bodies.pucks), len(scene.table.vertices)
@@ -73,16 +73,16 @@ class Space:
         self._radius = np.array(bodies.radius)[: bodies.paddles + bodies.pucks]
         self._reach = reaches(scene.table, scene.seats)
         self._held = np.zeros(bodies.paddles, np.bool_)
-        """True for paddles that began the step in their reaches, which hold them."""
+        """True for paddles that began the step in the workspace, which limits them."""
         self._out: dict[int, tuple[float, float]] = {}
-        """Positions at which pucks left play, by puck, m."""
+        """Positions at which pucks left play, by puck, table frame, m."""
         self._initial_contacts: set[tuple[int, int]] = set()
-        """Pairs of puck and side in contact at a reset, which is no new bounce."""
+        """Pairs of puck and side in contact at a reset, which are not bounces."""
         self._key, self._collisions, self._scatters = np.uint64(0), 0, False
         self._kicks: dict[tuple[pymunk.Shape, ...], float] = {}
-        """What scatter adds to contacts that begin, see `core.scatter`."""
+        """Contact noise of contacts that begin, by shapes, see `core.scatter`."""
         self._contact = False
-        """True if a paddle touches a puck, or a puck has crossed a goal line."""
+        """True if a paddle touches a puck, or if a puck has crossed a goal line."""
         at_paddle = {"begin": self._touch, "separate": self._part}
         for kind, other, begin in (
             (PADDLE, PUCK, at_paddle),
@@ -126,7 +126,7 @@ class Space:
                 body.moment = mass * (2 * half) ** 2 / 6
 
     def key_scatter(self, key: np.uint64) -> None:
-        """Set the key of the contacts' scatter; collisions are counted from 0 again."""
+        """Set the key of the contact noise and the number of collisions to 0."""
         self._key, self._collisions = key, 0
 
     def reset(
@@ -137,17 +137,17 @@ class Space:
         spin: Array,
         touching: Array,
     ) -> None:
-        """Place all bodies and set the contacts that exist already.
+        """Place all bodies and set the contacts that already exist.
 
-        Shapes are removed and added in order, which clears Chipmunk's contact caches:
-        equal initial states give equal episodes.
+        Shapes are removed and added in order, which clears the contact caches of
+        Chipmunk. Equal initial states therefore lead to equal episodes.
 
         Args:
-            position: (N, 2) m.
-            velocity: (N, 2) m/s.
-            angle: (N,) rad.
-            spin: (N,) rad/s.
-            touching: (paddles, pucks) bool.
+            position: Positions (N, 2), table frame, m.
+            velocity: Velocities (N, 2), table frame, m/s.
+            angle: Orientations (N,), rad.
+            spin: Angular velocities (N,), rad/s.
+            touching: True for paddles and pucks in contact (paddles, pucks).
         """
         self.space.remove(*self.bodies.shapes)
         self.space.add(*self.bodies.shapes)
@@ -179,11 +179,12 @@ class Space:
         """Advance by a control step.
 
         Args:
-            paddles: positions (paddles, 2), m, and velocities, m/s; changed in place.
-            command: velocity at the end of the step (paddles, 2), m/s; True if the
-                paddle moves at it during all of the step and does not yield (paddles,);
-                True if it touches nothing (paddles,).
-            path: (substeps + 1, movers, 4), filled; or None.
+            paddles: Positions (paddles, 2), m, and velocities (paddles, 2), m/s, of the
+                paddles, table frame, changed in place.
+            command: Three arrays: velocities at the end of the step (paddles, 2), m/s;
+                True for paddles that have this velocity during the whole step and do
+                not yield (paddles,); True for paddles that touch nothing (paddles,).
+            path: Path (substeps + 1, movers, 4), filled; None if it is not requested.
         """
         (position, velocity), (goal, imposed, raised) = paddles, command
         mean, size = np.zeros(goal.shape), 2 * self.scene.table.paddle_radius
@@ -221,9 +222,9 @@ class Space:
         self._lift_pinned(position, imposed, raised)
 
     def _count(self, velocity: Array, goal: Array) -> int:
-        """Return the number of substeps in which nothing moves too far.
+        """Return the number of substeps in which no body moves too far.
 
-        A puck that a paddle hits becomes faster by at most twice its speed.
+        A hit increases the speed of a puck by at most twice the speed of the paddle.
         """
         pucks = self.bodies.all[self.scene.bodies.puck]
         fastest = max((puck.velocity.length for puck in pucks), default=0.0)
@@ -233,7 +234,7 @@ class Space:
         return self.substeps * max(int(np.ceil(way / self.substeps)), 1)
 
     def _leap(self, time: float) -> None:
-        """Move the velocities of pucks on by a time in free flight, s."""
+        """Advance the velocities of pucks by a time in free flight, s."""
         for k, body in enumerate(self.bodies.all[self.scene.bodies.puck]):
             if k not in self._out:
                 v = body.velocity
@@ -243,7 +244,7 @@ class Space:
     def _glide(
         self, body: pymunk.Body, gravity: object, damping: float, dt: float
     ) -> None:
-        """Advance the velocity of a puck as in free flight; its spin stays."""
+        """Advance the velocity of a puck as in free flight; keep its spin."""
         v = body.velocity
         _, _, vx, vy = fly(v.x, v.y, dt, *self._pull, *self._drag)
         body.velocity = vx, vy
@@ -266,7 +267,7 @@ class Space:
             spin[bodies.puck.start + k] = 0.0
 
     def close_goals(self, closed: Array) -> None:
-        """Close the goal lines that ``closed`` (M,) marks and open the others."""
+        """Close the goal lines with True in ``closed`` (M,) and open the others."""
         for index, plug in self._walls.plugs.items():
             line = self.scene.goal_lines[index]
             self._sides[line.side, 5] = 0.0 if closed[index] else (line.width or 0) / 2
@@ -282,7 +283,7 @@ class Space:
         self._contact = bool(self._out) or bool(self.touching.any())
 
     def _raise(self, raised: Array) -> None:
-        """Disable contacts of the paddles that ``raised`` (paddles,) marks."""
+        """Disable the contacts of paddles with True in ``raised`` (paddles,)."""
         for shape, up in zip(self.bodies.shapes, raised.tolist(), strict=False):
             wanted = NOTHING if up else EVERYTHING
             if shape.filter != wanted:
@@ -327,7 +328,7 @@ class Space:
         return True
 
     def _hit(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        """Set the laws of a puck at a paddle."""
+        """Set the restitution and the friction of a puck at a paddle."""
         restitution = self._values["paddle_restitution"]
         if self._scatters and arbiter.is_first_contact:
             names = "paddle_restitution_scatter", "spin_scatter"
@@ -338,12 +339,12 @@ class Space:
         arbiter.friction = self._values["paddle_friction"]
 
     def _draw(self) -> tuple[float, float, float]:
-        """Draw the scatter of the next collision."""
+        """Sample the noise of the next collision."""
         self._collisions += 1
         return draw(self._key, self._collisions, 0)
 
     def _kick(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        """Add to a puck what its first contact scatters."""
+        """Add the noise of the first contact to the motion of a puck."""
         kick = self._kicks.pop(arbiter.shapes, 0.0)
         if kick == 0.0:
             return
@@ -357,12 +358,12 @@ class Space:
             body.velocity += kick * arbiter.normal.perpendicular()
 
     def _meet(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        """Set the laws of two pucks."""
+        """Set the restitution and the friction of two pucks."""
         arbiter.restitution = self._values["puck_restitution"]
         arbiter.friction = self._values["puck_friction"]
 
     def _bounce(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        """Set the laws of a puck at a wall."""
+        """Set the restitution and the friction of a puck at a wall."""
         restitution = self._at_wall(arbiter, PUCK)
         if self._scatters and arbiter.is_first_contact:
             names = "wall_restitution_scatter", "wall_exit_scatter"
@@ -374,7 +375,7 @@ class Space:
         arbiter.friction = self._values["wall_friction"]
 
     def _shove(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        """Set the laws of a block, which returns no more than what it meets."""
+        """Set the restitution and the friction of a block; a wall limits the former."""
         _block, other = self._ordered(arbiter, BLOCK)
         arbiter.restitution = self._values["block_restitution"]
         arbiter.friction = 0.0
@@ -385,7 +386,7 @@ class Space:
             arbiter.restitution = min(arbiter.restitution, wall)
 
     def _at_wall(self, arbiter: pymunk.Arbiter, kind: int) -> float:
-        """Return the restitution at a wall, which depends on the normal speed."""
+        """Return the restitution at a wall for the normal speed of the contact."""
         names = "wall_restitution", "wall_restitution_slope"
         values = (self._values[name] for name in names)
         return float(wall_restitution(self._closing(arbiter, kind), *values))
@@ -400,7 +401,7 @@ class Space:
     def _ordered(
         arbiter: pymunk.Arbiter, kind: int
     ) -> tuple[pymunk.Shape, pymunk.Shape]:
-        """Return the shape of a kind, then the other; Chipmunk may swap them."""
+        """Return the shape of a kind, then the other one; Chipmunk may swap them."""
         a, b = arbiter.shapes
         return (a, b) if a.collision_type == kind else (b, a)
 
@@ -411,9 +412,10 @@ class Space:
     def _settle(
         self, position: Array, velocity: Array, imposed: Array, raised: Array
     ) -> None:
-        """Correct bodies after a contact: below the cap, apart, parked if out.
+        """Limit speeds, separate bodies and remove pucks out of play after a contact.
 
-        Paddles that could not make a puck give way stop: their rows change.
+        A paddle stops at a puck that it cannot push away. Its rows of ``position`` and
+        ``velocity`` then change.
         """
         paddles = len(position)
         pucks = self.bodies.all[self.scene.bodies.puck]
@@ -443,7 +445,7 @@ class Space:
                 puck.velocity = puck.velocity * share
 
     def _lift_pinned(self, position: Array, imposed: Array, raised: Array) -> None:
-        """Lift the pucks that prescribed paddles have left no room for some time."""
+        """Lift pucks that position-driven paddles have pinned for `PATIENCE`."""
         table = self.scene.table
         touch = table.paddle_radius + table.puck_radius - 1e-3
         for k, puck in enumerate(self.bodies.all[self.scene.bodies.puck]):

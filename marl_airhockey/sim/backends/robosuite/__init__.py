@@ -1,4 +1,4 @@
-"""Robosuite backend: one UR5e per seat, in MuJoCo."""
+"""Robosuite backend: one UR5e for each seat, in MuJoCo."""
 
 from marl_airhockey.sim.backends.robosuite.backend import make
 

@@ -1,4 +1,4 @@
-"""Arrays of the compiled stepper: views of a simulation, static scene, step output."""
+"""Arrays of the compiled stepper: views of a simulation, static values, and output."""
 
 from __future__ import annotations
 
@@ -17,103 +17,103 @@ from marl_airhockey.types import Array
 
 TRACE = ("height", "tilt", "force", "joint_speed", "share", "speed")
 """Columns of the trace of a paddle at every physics step: height above the table (m),
-angle off its orientation (rad), force on the table (N), speed of the fastest joint
-(rad/s), share of the motion that the torques allow (1), speed (m/s)."""
+error of the orientation (rad), force on the table (N), speed of the fastest joint
+(rad/s), share of the motion that the torque limits allow (1), speed (m/s)."""
 
 
 class SimulationViews(NamedTuple):
-    """Views of one world's MuJoCo arrays (no copies), and the indices of its parts."""
+    """Views, not copies, of one world's MuJoCo arrays, and indices of its parts."""
 
     model: int
-    """Address of the model"""
+    """Address of the model."""
     data: int
-    """Address of the data"""
+    """Address of the data."""
     inertia: int
-    """Address of qM"""
+    """Address of qM."""
     qpos: Array
     qvel: Array
     applied: Array
-    """Applied generalised forces, qfrc_applied (nv,)"""
+    """Applied generalised forces, qfrc_applied (nv,)."""
     ctrl: Array
     bias: Array
-    """Gravity, Coriolis and centrifugal torques, qfrc_bias (nv,)"""
+    """Gravity, Coriolis and centrifugal torques, qfrc_bias (nv,)."""
     site_positions: Array
-    """Positions of the sites (sites, 3), world frame, m"""
+    """Positions of the sites (sites, 3), world frame, m."""
     site_rotations: Array
-    """Rotations of the sites to the world frame (sites, 9)"""
+    """Rotations of the sites to the world frame (sites, 9)."""
     sensors: Array
     arms: Array
-    """Indices of each arm (seats, 6): its first joint in qpos, in qvel and in ctrl;
-    foot site; body of that site; force sensor"""
+    """Indices of each arm (seats, 6): first joint in qpos, in qvel and in ctrl; site of
+    the foot; body of this site; force sensor."""
     movers: Array
-    """Indices of x of pucks and blocks in qpos and in qvel (movers, 2)"""
+    """Indices of x of pucks and blocks in qpos and in qvel (movers, 2)."""
     sliding: Sliding
-    """Arrays of the pucks and blocks"""
+    """Arrays of the pucks and blocks."""
     gravity: Array
-    """Gravity (3,), m/s2"""
+    """Gravity (3,), world frame, m/s2."""
     gains: Array
-    """Gains of the controllers (seats, 8): `osc.Gains`"""
+    """Gains of the controllers (seats, 8), see `osc.Gains`."""
     payloads: Array
-    """Masses at the feet that the controllers do not know (seats,), kg"""
+    """Masses at the feet that the controllers do not know (seats,), kg."""
 
 
 class StaticScene(NamedTuple):
-    """Static side that all worlds share."""
+    """Static values that all worlds share."""
 
     origin: Array
-    """Origin of the table frame (3,), world frame, m"""
+    """Origin of the table frame (3,), world frame, m."""
     rotation: Array
-    """Rotation from the table frame to the world's (3, 3)"""
+    """Rotation from the table frame to the world frame (3, 3)."""
     foot_rotations: Array
-    """Wanted rotations of the feet to the world frame (seats, 3, 3)"""
+    """Target rotations from the feet to the world frame (seats, 3, 3)."""
     low: Array
-    """Smallest torques of the joints (seats, 6), Nm"""
+    """Smallest torques of the joints (seats, 6), Nm."""
     high: Array
-    """Largest torques of the joints (seats, 6), Nm"""
+    """Largest torques of the joints (seats, 6), Nm."""
     radius: Array
-    """Radii of paddle and puck (2,), m"""
+    """Radii of paddle and puck (2,), m."""
     pucks: int
     normals: Array
-    """Inward normals of the sides of the goal lines (goal_lines, 2)"""
+    """Inward normals of the sides of the goal lines (goal_lines, 2)."""
     offsets: Array
-    """Offsets of these sides (goal_lines,), m"""
+    """Offsets of the sides of the goal lines (goal_lines,), m."""
     openings: Array
-    """Ends of the goal lines (goal_lines, 2, 2), m"""
+    """Ends of the goal lines (goal_lines, 2, 2), table frame, m."""
     sides: Array
-    """Sides of the table (sides, 6): `walls.sides`"""
+    """Sides of the table (sides, 6), see `walls.sides`."""
     whole_side: Array
-    """True if a goal line is a whole side, crossed by touching it (goal_lines,)"""
+    """True if a goal line is a whole side, which a touch crosses (goal_lines,)."""
 
 
 class StepOutput(NamedTuple):
-    """Output of a world's step, filled in place; names of events as in `State`."""
+    """Output of a step of one world, filled in place; `State` defines its events."""
 
     paddles: Array
-    """Columns x, y, vx, vy of the paddles (seats, 4), table frame"""
+    """Columns x, y, vx, vy of the paddles (seats, 4), table frame, m and m/s."""
     touched: Array
     touched_at: Array
     touching: Array
-    """True if in contact (seats, pucks); persists between steps"""
+    """True if in contact (seats, pucks); persists between steps."""
     banked: Array
-    """Number of bounces (pucks, sides)"""
+    """Number of bounces (pucks, sides)."""
     against: Array
-    """True if a puck touches the rail of a side (pucks, sides); persists"""
+    """True if a puck touches the rail of a side (pucks, sides); persists."""
     crossed: Array
     crossed_velocity: Array
     lifted: Array
-    """Never true: arms do not lift pucks (pucks,)"""
+    """Always False, because arms do not lift pucks (pucks,)."""
     beyond: Array
-    """True if a puck is at or past a goal line (pucks, goal_lines); persists"""
+    """True if a puck is at or beyond a goal line (pucks, goal_lines); persists."""
     path: Array
-    """Columns x, y, vx, vy (substeps + 1 or 0, movers with paddles, 4)"""
+    """Columns x, y, vx, vy (substeps + 1 or 0, movers with paddles, 4)."""
     trace: Array
-    """Trace (substeps, seats, len(TRACE)): see `TRACE`"""
+    """Trace (substeps, seats, len(TRACE)), see `TRACE`."""
 
 
 def make_static_scene(
     scene: Scene, frame: TableFrame, hands: Sequence[SeatController]
 ) -> StaticScene:
-    """Return the static side of a scene on a table, with its bound controllers."""
+    """Return the static values of a scene and its bound controllers."""
     table, lines = scene.table, scene.goal_lines
     return StaticScene(
         origin=frame.origin,
@@ -141,11 +141,11 @@ def make_views(
     """Return the views of a model and its data.
 
     Args:
-        model: MuJoCo's model.
-        data: its data.
-        arms: (seats, 6) see `SimulationViews`.
-        table_physics: pucks and blocks of the model.
-        hands: controllers of the seats, for their gains.
+        model: MuJoCo model.
+        data: MuJoCo data.
+        arms: Indices of each arm (seats, 6), see `SimulationViews`.
+        table_physics: Physics of the pucks and blocks of the model.
+        hands: Controllers of the seats, for their gains.
     """
     return SimulationViews(
         model=model._address,
@@ -169,7 +169,7 @@ def make_views(
 
 
 def make_output(scene: Scene, path: tuple[int, ...], trace: Array) -> StepOutput:
-    """Return an output with fresh arrays but for ``trace``; ``path`` is a shape."""
+    """Return an output with the given trace and a path of shape ``path``."""
     pairs = len(scene.seats), scene.pucks
     crossings = scene.pucks, len(scene.goal_lines)
     banks = scene.pucks, len(scene.table.vertices)

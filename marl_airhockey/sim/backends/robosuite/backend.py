@@ -1,4 +1,4 @@
-"""Robosuite backend: one UR5e per seat on a table in MuJoCo, built with robosuite."""
+"""Robosuite backend: one UR5e for each seat on a table in MuJoCo."""
 
 from __future__ import annotations
 
@@ -28,17 +28,18 @@ if TYPE_CHECKING:
     from marl_airhockey.sim.backends.robosuite.offscreen import OffscreenRenderer
 
 NEWEST = "mujoco==3.9.0"
-"""Newest release that robosuite works with."""
+"""Newest release of MuJoCo that robosuite supports."""
 MAX_TIMESTEP = 0.004
-"""Longest physics step with which arms follow their command (s)."""
+"""Longest physics step with which arms follow their command, s."""
 
 
 class RobosuiteBackend(Backend):
     """Backend with B MuJoCo simulations of robosuite's model, stepped in compiled code.
 
-    Paddles track their command as an arm can, and pucks push them; contacts last some
-    milliseconds. A prescribed paddle moves at its seat's top speed at most. ``trace``
-    holds the motion of the arms at every physics step: see `arrays.TRACE`.
+    Paddles follow their commands within the limits of an arm, and pucks push them.
+    Contacts last some milliseconds. A position-driven paddle moves at most at the top
+    speed of its seat. ``trace`` is the motion of the arms at every physics step, see
+    `arrays.TRACE`.
     """
 
     instant_contacts: ClassVar[bool] = False
@@ -62,16 +63,16 @@ class RobosuiteBackend(Backend):
     def supports(cls, scene: Scene) -> str | None:
         table, seats = scene.table, scene.seats
         if table.vertices != TABLES["standard"].vertices:
-            return "arms are placed for the standard table"
+            return "it supports only the standard table"
         sides = [seat.side for seat in seats]
         if len(set(sides)) < len(sides) or not set(sides) <= {0, 2}:
-            return "there is room for one arm at each end"
+            return "it supports one arm at each end of the table"
         for i, seat in enumerate(seats):
             held = make_seat("robot", table, seat.side)
             if seat.reach != held.reach or seat.speed > held.speed:
-                return f"an arm cannot hold the seat of paddle_{i}: say seats='robot'"
+                return f"an arm cannot cover the seat of paddle_{i}; use seats='robot'"
         if scene.blocks and any(goal_line.width for goal_line in scene.goal_lines):
-            return "blocks could slide into a goal; leave out one or the other"
+            return "blocks could slide into a goal; remove the blocks or the goals"
         return None
 
     def __init__(
@@ -86,11 +87,11 @@ class RobosuiteBackend(Backend):
         if control_dt / substeps > MAX_TIMESTEP:
             least = math.ceil(control_dt / MAX_TIMESTEP - 1e-9)
             raise ValueError(
-                f"substeps: {substeps} are too few to hold an arm: at least {least}"
+                f"substeps: {substeps} are too few for an arm; use at least {least}"
             )
         self._dt = control_dt / substeps
         self.env = _make_env(scene, self._dt, control_dt)
-        """Robosuite environment whose model all worlds copy."""
+        """Robosuite environment; all worlds copy its model."""
         from marl_airhockey.sim.backends.robosuite.arrays import (
             TRACE,
             make_static_scene,
@@ -110,7 +111,7 @@ class RobosuiteBackend(Backend):
         self._renderers: dict[int, OffscreenRenderer] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the content of a copy, which opens its own OpenGL contexts."""
+        """Return the content of a copy, which opens OpenGL contexts of its own."""
         return {
             "arguments": (self.scene, self.num_worlds, self.control_dt, self.substeps),
             "worlds": [world.save() for world in self.worlds],
@@ -171,7 +172,7 @@ class RobosuiteBackend(Backend):
         self._last_goal[:] = goal
 
     def _goal(self, command: Command, before: State) -> Array:
-        """Return final velocities (B, seats, 2), m/s; prescribed ones at top speed."""
+        """Return velocities at the end of the step (B, seats, 2), table frame, m/s."""
         goal = np.zeros(command.velocity.shape)
         seats = goal.shape[:2]
         imposed, raised = np.zeros(seats, np.bool_), np.zeros(seats, np.bool_)
@@ -203,9 +204,9 @@ class RobosuiteBackend(Backend):
 
 def _make_env(scene: Scene, timestep: float, control_dt: float) -> Any:
     """Return a robosuite environment of a scene, reset."""
-    # Headless rendering; MuJoCo reads the variable at its import.
+    # Render without a display. MuJoCo reads the variable at its import.
     os.environ.setdefault("MUJOCO_GL", "egl")
-    # Robosuite warns of optional files; only errors are shown.
+    # Robosuite warns about optional files; show only its errors.
     log = logging.getLogger("robosuite_logs")
     log.addFilter(lambda record: record.levelno >= logging.ERROR)
     from marl_airhockey.sim.backends.robosuite.env import AirHockey

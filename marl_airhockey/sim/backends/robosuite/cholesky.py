@@ -10,7 +10,7 @@ from marl_airhockey.types import Array
 
 @inner()
 def factor(a: Array) -> None:
-    """Compute Cholesky's lower factor of a symmetric positive matrix, in place."""
+    """Compute the lower Cholesky factor of a symmetric positive matrix, in place."""
     n = len(a)
     for j in range(n):
         for k in range(j):
@@ -24,7 +24,7 @@ def factor(a: Array) -> None:
 
 @inner()
 def solve(lower: Array, b: Array) -> None:
-    """Solve a linear system with a Cholesky factor, in place."""
+    """Solve a linear system with its Cholesky factor, in place."""
     n = len(b)
     for i in range(n):
         for k in range(i):

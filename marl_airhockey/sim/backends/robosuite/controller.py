@@ -1,4 +1,4 @@
-"""Controller of one arm: from actions to a reference motion and joint torques."""
+"""Controller of one arm: computes a reference motion and joint torques from actions."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from marl_airhockey.sim.core.seat import ReachPlanes
 from marl_airhockey.types import Array
 
 HOME_DISTANCE = 0.35
-"""Distance of a paddle's home position from the edge of its side (m)."""
+"""Distance of a paddle's home position from the edge of its side, m."""
 
 
 class SeatController:
     """Controller of a seat's arm in one simulation.
 
     Args:
-        scene: scene of the seat.
-        frame: frame of the table.
-        seat: index of the seat.
-        period: length of a control step, s.
-        gains: gains of `osc.torques`; None for the defaults.
+        scene: Scene of the seat.
+        frame: Frame of the table.
+        seat: Index of the seat.
+        period: Length of a control step, s.
+        gains: Gains of `osc.torques`; None for the defaults.
     """
 
     def __init__(
@@ -41,12 +41,12 @@ class SeatController:
         self.seat, self.frame, self.period = scene.seats[seat], frame, period
         self.gains = (gains or Gains()).array
         self.foot_rotation = frame.foot_rotation(scene, seat)
-        """Wanted rotation of the paddle's foot to the world frame (3, 3)."""
+        """Target rotation from the paddle's foot to the world frame (3, 3)."""
         normal = scene.table.normals[self.seat.side]
         offset = float(scene.table.offsets[self.seat.side])
         offset -= HOME_DISTANCE
         self.home = (float(-normal[0] * offset), float(-normal[1] * offset))
-        """Home position of the paddle, table frame, m."""
+        """Home position of the paddle (2,), table frame, m."""
         self._reach = ReachPlanes.of(scene.table, (self.seat,))
         self.start, self.old, self.new = np.zeros((3, 2))
         self._steps = 0
@@ -55,7 +55,7 @@ class SeatController:
     def bind(
         self, model: Any, data: Any, site: int, dofs: Any, low: Array, high: Array
     ) -> None:
-        """Bind to a simulation: its arrays, the site of the foot, the arm's joints."""
+        """Set the model, the data, the site of the foot, and the joints of the arm."""
         self._model, self._data, self._site = model, data, site
         self._dofs = np.asarray(dofs)
         self._body = int(model.site_bodyid[site])
@@ -64,7 +64,7 @@ class SeatController:
         self._mass = np.zeros((model.nv, model.nv))
 
     def hold(self) -> None:
-        """Hold the paddle at its present position."""
+        """Hold the paddle at its current position."""
         self.start, self.old, self.new = self.position[:2], np.zeros(2), np.zeros(2)
         self._acceleration[:] = 0.0
 
@@ -82,10 +82,10 @@ class SeatController:
         return np.asarray((jacobian @ self._data.qvel) @ self.frame.rotation)
 
     def set_action(self, action: Array) -> None:
-        """Set an action (2,): fractions of the top speed, ego frame.
+        """Set an action (2,): target velocity divided by the top speed, ego frame.
 
         Raises:
-            ValueError: an action that is not finite.
+            ValueError: An element is not finite.
         """
         position = self.position[None, None, :2].copy()
         limited, top = Limited.empty(1, 1), (self.seat.speed, self.seat.acceleration)
@@ -104,16 +104,16 @@ class SeatController:
         self.ramp_to(limited.velocity[0, 0])
 
     def ramp_to(self, velocity: Array) -> None:
-        """Ramp the reference to a velocity (2,), table frame, m/s, within a period."""
+        """Start a ramp of one period to a velocity (2,), table frame, m/s."""
         out = np.zeros((3, 2))
         reference_motion(self.start, self.old, self.new, self.period, self.period, out)
         self.start = limit_lead(out[0], self.position[:2])
         self.old, self.new, self._steps = self.new, np.array(velocity), 0
 
     def torques(self) -> Array:
-        """Return the torques (n,), Nm, of the next physics step.
+        """Return the joint torques (n,) of the next physics step, Nm.
 
-        The data's derived arrays must be up to date.
+        The derived arrays of the data must be up to date.
         """
         model, data, dofs = self._model, self._data, self._dofs
         jacobian, drift = self._jacobian, self._drift

@@ -1,4 +1,4 @@
-"""Robosuite environment of air hockey: one UR5e per seat, controlled by `osc`."""
+"""Robosuite environment of air hockey: `osc` controls one UR5e for each seat."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 ARM = "UR5e"
-"""Robosuite's name of the arm."""
+"""Name of the arm in robosuite."""
 
 
 class TableController(OperationalSpaceController):
     """Arm controller of robosuite with the torques of `osc.torques`.
 
-    An action is the wanted velocity in the plane, as fractions of the seat's top speed,
-    in its ego frame; the shared limits apply.
+    An action is the target velocity in the plane, divided by the top speed of the seat,
+    in its ego frame. The limits of `core.limits` apply.
     """
 
     def __init__(self, *args: Any, hand: SeatController, **rest: Any) -> None:
@@ -44,7 +44,7 @@ class TableController(OperationalSpaceController):
         self.input_min, self.input_max = -np.ones(2), np.ones(2)
 
     def bind(self) -> None:
-        """Bind to the arrays of the present simulation."""
+        """Set the arrays of the current simulation."""
         model, data = self.sim.model._model, self.sim.data._data
         site = self.sim.model.site_name2id(self.ref_name)
         low, high = self.actuator_min, self.actuator_max
@@ -88,7 +88,7 @@ class AirHockeyController(CompositeController):
 
 
 def default_scene() -> Scene:
-    """Return a scene of one robot seat at home and a puck, on the standard table."""
+    """Return the standard table with a robot seat at the home end and a puck."""
     table = TABLES["standard"]
     return Scene(table, (make_seat("robot", table, 0),), pucks=1)
 
@@ -97,14 +97,14 @@ class AirHockey(ManipulationEnv):
     """Environment of ``robosuite.make("AirHockey", robots="UR5e")``.
 
     Args:
-        robots: one name for each seat of the scene.
-        scene: scene on the table; None for `default_scene`.
-        timestep: length of a physics step, s.
-        control_freq: control steps per second.
-        rest: further arguments of robosuite's environments.
+        robots: Name of the robot of each seat of the scene, or one name for all seats.
+        scene: Scene on the table; None for `default_scene`.
+        timestep: Length of a physics step, s.
+        control_freq: Number of control steps per second.
+        rest: Other arguments of robosuite's environments.
 
     Raises:
-        ValueError: robots that are not one UR5e per seat.
+        ValueError: The robots are not one UR5e for each seat.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class AirHockey(ManipulationEnv):
         names = [robots] * len(self.scene.seats) if isinstance(robots, str) else robots
         if list(names) != [ARM] * len(self.scene.seats):
             raise ValueError(
-                f"robots: {robots!r}; {len(self.scene.seats)} seats are played "
+                f"robots: {robots!r}; the {len(self.scene.seats)} seats must be played "
                 f"by as many {ARM}"
             )
         self.frame = TableFrame(self.scene.defaults.get("tilt", 0.0))
@@ -189,10 +189,10 @@ class AirHockey(ManipulationEnv):
         _disable_air_and_links(self.sim.model._model)
 
     def physics_model(self) -> Any:
-        """Return the same MuJoCo model without its visuals: 2 MB instead of 34."""
+        """Return the MuJoCo model without its visuals, with 2 MB instead of 34 MB."""
         spec = mujoco.MjSpec.from_string(self.model.get_xml())
         spec.compiler.discardvisual = True
-        # Contact memory grows on demand, instead of thousands per world.
+        # Allocate memory for contacts on demand, not for thousands per world.
         spec.nconmax = spec.njmax = -1
         model = spec.compile()
         model.opt.timestep = self.sim.model._model.opt.timestep
@@ -226,7 +226,7 @@ class AirHockey(ManipulationEnv):
         return {}
 
     def reward(self, action: Array | None = None) -> float:
-        """Return 0: scenarios hold the rewards."""
+        """Return 0, because scenarios compute the rewards."""
         return 0.0
 
     def _check_success(self) -> bool:
@@ -234,10 +234,10 @@ class AirHockey(ManipulationEnv):
 
 
 def _disable_air_and_links(model: Any) -> None:
-    """Disable the air and the contacts of links that robosuite's models have."""
+    """Disable the air and the contacts of links in robosuite's models."""
     # Air would slow pucks down.
     model.opt.density = model.opt.viscosity = 0.0
     for k in range(model.ngeom):
         if model.geom(k).name.startswith(("robot", "mount", "fixed_mount")):
-            # Only the paddle has contacts: links pass through everything.
+            # Only the paddle has contacts; links pass through all bodies.
             model.geom_contype[k] = model.geom_conaffinity[k] = 0

@@ -1,7 +1,7 @@
-"""Frames of the table and the arms' bases in the world of the 3D simulator.
+"""Frames of the table and of the arm bases in the world frame of MuJoCo.
 
-The world's z is up. The table frame is that of `table.Table`, its plane raised toward
-the far end by the tilt, its z the surface's normal.
+The z axis of the world frame points up. The table frame is the frame of `table.Table`.
+The tilt raises its plane toward the far end. Its z axis is the normal of the surface.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.types import Array
 
 HEIGHT = 0.8
-"""Height of the table's centre above the floor (m)."""
+"""Height of the table's centre above the ground, m."""
 BEHIND = 0.22
-"""Distance of an arm's base from the edge of its seat's side (m). With it a UR5e holds
-the robot seat at 0.7 m/s in every direction with joints under 0.9 pi rad/s, on a flat
-table and on one of 5.5 degrees, at both ends; with 0.20 and 0.25 it does not."""
+"""Distance of an arm's base from the edge of its side, m. With 0.22 m a UR5e can move
+at 0.7 m/s in every direction in the whole workspace of the robot seat, with joint
+speeds below 0.9 pi rad/s. This holds at both ends, on a level table and at 5.5 degrees.
+It does not hold for 0.20 and 0.25 m."""
 BELOW = 0.02
-"""Height of the edge in front of a base above the base (m)."""
+"""Height above a base of the table's edge in front of it, m."""
 
 
 @dataclass(frozen=True)
@@ -29,17 +30,17 @@ class TableFrame:
     """Frame of a tilted table."""
 
     tilt: float = 0.0
-    """Tilt of the table, deg"""
+    """Tilt of the table, degrees."""
 
     @cached_property
     def rotation(self) -> Array:
-        """Rotation from the table frame to the world's (3, 3)."""
+        """Rotation from the table frame to the world frame (3, 3)."""
         c, s = np.cos(np.radians(self.tilt)), np.sin(np.radians(self.tilt))
         return np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
 
     @cached_property
     def origin(self) -> Array:
-        """Table's centre in the world (3,), m."""
+        """Centre of the table (3,), world frame, m."""
         return np.array([0.0, 0.0, HEIGHT])
 
     @cached_property
@@ -49,16 +50,16 @@ class TableFrame:
         return np.array([np.cos(half), 0.0, np.sin(half), 0.0])
 
     def to_world(self, x: float, y: float, z: float = 0.0) -> Array:
-        """Transform a point from the table frame to the world (3,), m."""
+        """Transform a point from the table frame to the world frame (3,), m."""
         return np.asarray(self.origin + self.rotation @ (x, y, z))
 
     def gravity(self, tilt: float, cross_tilt: float, strength: float) -> Array:
-        """Return the gravity (3,), m/s2, that emulates other tilts of this table."""
+        """Return the gravity (3,), m/s2, that emulates other tilts (degrees)."""
         more, aside = np.radians(tilt - self.tilt), np.radians(cross_tilt)
         return -strength * np.array([np.sin(more), np.sin(aside), np.cos(more)])
 
     def base(self, scene: Scene, seat: int) -> tuple[Array, float]:
-        """Return position (3,), m, and heading about z, rad, of a seat's arm base."""
+        """Return position (3,), m, and heading, rad, of an arm's base, world frame."""
         table, side = scene.table, scene.seats[seat].side
         normal, distance = table.normals[side], table.offsets[side] + BEHIND
         x, y = -normal * distance
@@ -67,9 +68,9 @@ class TableFrame:
         return np.array([x, y, z]), float(np.arctan2(normal[1], normal[0]))
 
     def foot_rotation(self, scene: Scene, seat: int) -> Array:
-        """Return the wanted rotation of a paddle's foot to the world frame (3, 3).
+        """Return the target rotation from a paddle's foot to the world frame (3, 3).
 
-        Its z points into the table, its x from the base over the table.
+        The z axis of the foot points into the table, the x axis from the base over it.
         """
         normal = scene.table.normals[scene.seats[seat].side]
         x = self.rotation @ (normal[0], normal[1], 0.0)

@@ -10,9 +10,9 @@ import numpy as np
 from marl_airhockey.types import Array
 
 ELBOW_UP = (-0.2349, -0.9849, 2.0144, -2.7482, -1.5543, -3.3757)
-"""Initial angles of the search, rad, with which it ends with the elbow up."""
+"""Initial angles of the search, rad. From them, the search ends with the elbow up."""
 TOLERANCE = 1e-7
-"""Largest norm of the error, in m and rad together."""
+"""Largest norm of the error, which combines m and rad."""
 MAX_ITERATIONS = 200
 
 
@@ -29,17 +29,17 @@ def find_joint_angles(
     """Find joint angles (n,), rad, by damped least squares; ``data`` is changed.
 
     Args:
-        model: MuJoCo's model.
-        data: its data.
-        site: site of the paddle's foot.
-        qpos_index: indices of the arm's joints in qpos.
-        dofs: indices of the arm's joints in qvel.
-        target: wanted position (3,), world frame, m.
-        rotation: wanted rotation to the world frame (3, 3).
-        initial: initial angles of the search (n,), rad.
+        model: MuJoCo model.
+        data: MuJoCo data.
+        site: Site of the paddle's foot.
+        qpos_index: Indices of the arm's joints in qpos (n,).
+        dofs: Indices of the arm's joints in qvel (n,).
+        target: Target position (3,), world frame, m.
+        rotation: Target rotation from the foot to the world frame (3, 3).
+        initial: Initial angles of the search (n,), rad.
 
     Raises:
-        ValueError: a pose that the arm does not reach.
+        ValueError: The arm cannot reach the pose.
     """
     angles = np.array(initial, dtype=float)
     jacobian = np.zeros((6, model.nv))
@@ -56,4 +56,4 @@ def find_joint_angles(
         arm = jacobian[:, dofs]
         step = arm.T @ np.linalg.solve(arm @ arm.T + 1e-6 * np.eye(6), error)
         angles += np.clip(step, -0.2, 0.2)
-    raise ValueError(f"the arm does not reach {np.round(target, 3)} m")
+    raise ValueError(f"the arm cannot reach {np.round(target, 3)} m")

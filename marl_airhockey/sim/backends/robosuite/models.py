@@ -1,4 +1,4 @@
-"""Models for robosuite: the table with pucks and blocks, and the paddle as gripper."""
+"""Models for robosuite: table with pucks and blocks, and paddle as a gripper."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from marl_airhockey.types import Array
 HERE = Path(__file__).parent
 """Folder of the XML files."""
 SLIDES, RAIL, FOOT = 2, 8, 4
-"""Bits of contacts between: paddle's side, pucks and blocks; pucks, blocks and rails;
-the paddle's foot and the table."""
+"""Contact bits of three groups: the paddle's side with pucks and blocks; pucks, blocks
+and rails; the paddle's foot and the table."""
 THICK = 0.06
-"""Thickness of rails (m)."""
+"""Thickness of rails, m."""
 TALL = 0.02
-"""Half the height of rails, pucks and blocks (m)."""
+"""Half the height of rails, pucks and blocks, m."""
 LOW = 0.004
-"""Height at which pucks and round blocks touch (m): a puck that is caught higher up
-between paddle and rail would tip the paddle."""
+"""Height at which pucks and round blocks touch, m. A higher contact would tilt the
+paddle if a puck is caught between paddle and rail."""
 
 
 @register_gripper
@@ -39,7 +39,7 @@ class AirHockeyPaddle(GripperModel):
 
     @property
     def init_qpos(self) -> None:
-        """Joint positions: None, without joints."""
+        """Joint positions: None, because there are no joints."""
         return None
 
 
@@ -47,8 +47,8 @@ class AirHockeyArena(Arena):
     """Arena of a scene: a tilted table with rails, pucks, blocks and obstacles.
 
     Args:
-        scene: scene on the table.
-        frame: frame of the table.
+        scene: Scene on the table.
+        frame: Frame of the table.
     """
 
     def __init__(self, scene: Scene, frame: TableFrame) -> None:
@@ -97,7 +97,7 @@ class AirHockeyArena(Arena):
         )
 
     def _rail(self, side: int) -> None:
-        """Add the rail of a side: a plane, or boxes beside its goal lines."""
+        """Add the rail of a side: a plane, or boxes next to its goal lines."""
         table, scene = self.scene.table, self.scene
         start, end = table.ends(side)
         along = (end - start) / np.linalg.norm(end - start)
@@ -155,7 +155,7 @@ class AirHockeyArena(Arena):
         body.append(
             new_geom(
                 name,
-                # Spheres of one height touch in one point, as discs in a plane do.
+                # Spheres at one height touch in one point, like discs in a plane.
                 "box" if square else "sphere",
                 pos=array_to_string([0, 0, LOW - TALL]),
                 size=array_to_string([radius, radius, LOW] if square else [radius]),
@@ -167,7 +167,7 @@ class AirHockeyArena(Arena):
         self.table.append(body)
 
     def _stands(self, frame: TableFrame) -> None:
-        """Add legs of the table and pedestals of the arms, as visuals."""
+        """Add legs of the table and pedestals of the arms, without contacts."""
         x, y = self.scene.table.size / 2 - 0.08
         for k, (i, j) in enumerate(((-x, -y), (-x, y), (x, -y), (x, y))):
             top = frame.to_world(float(i), float(j), -0.05)
@@ -202,7 +202,7 @@ class AirHockeyArena(Arena):
             (ax, ay), (bx, by) = ends
             points = [ax, ay, TALL, bx, by, TALL]
             shape = {"size": f"{radius}", "fromto": array_to_string(points)}
-            # A little lower than its ends, so that these cover it.
+            # The bar is a little lower than its ends, so that these cover it.
             long = np.hypot(bx - ax, by - ay)
             bar = {
                 "size": array_to_string([long / 2, radius, 0.98 * TALL]),

@@ -1,4 +1,4 @@
-"""Functions of MuJoCo's C library for compiled code, bound by name (and cacheable)."""
+"""Functions of MuJoCo's C library for compiled code, bound by name for caching."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _function(name: str, *arguments: Any) -> Any:
 
 _p, _i = types.intp, types.int32
 step1 = _function("mj_step1", _p)
-"""First half of a step (model, data): all that positions and velocities determine."""
+"""First half of a step (model, data): values that follow from qpos and qvel."""
 step2 = _function("mj_step2", _p)
 """Second half of a step (model, data): forces, accelerations, integration."""
 full_mass = _function("mj_fullM", _p, _p)

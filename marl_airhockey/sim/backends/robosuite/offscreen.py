@@ -1,4 +1,4 @@
-"""Camera: pictures of the arms and the table, rendered by MuJoCo without a screen."""
+"""Camera: images of the arms and the table, which MuJoCo renders without a display."""
 
 from __future__ import annotations
 
@@ -20,39 +20,39 @@ COLOURS: dict[Meaning, tuple[float, float, float, float]] = {
     "cost": (0.84, 0.37, 0.0, 0.5),
     "drag": (0.41, 0.45, 0.53, 0.5),
 }
-"""Colours of marks by what they mean (RGBA)"""
+"""Colours of marks by meaning, RGBA, 0 to 1."""
 THIN = 0.004
-"""Half the width of a line, and half the height of a circle (m)."""
+"""Half the width of a line, and half the height of a circle, m."""
 
 
 class OffscreenRenderer:
-    """Camera on one model, for pictures of one size.
+    """Camera of one model, for images of one size.
 
     Args:
-        model: MuJoCo's model.
-        frame: frame of the table.
-        width: of the pictures, pixels.
-        height: of the pictures, pixels.
+        model: MuJoCo model.
+        frame: Frame of the table.
+        width: Width of the images, pixels.
+        height: Height of the images, pixels.
 
     Raises:
-        RuntimeError: OpenGL is missing; the message names the packages to install.
+        RuntimeError: OpenGL is missing. The message names the packages to install.
     """
 
     def __init__(self, model: Any, frame: TableFrame, width: int, height: int) -> None:
         self._frame, self._model = frame, model
         self._data = mujoco.MjData(model)
-        # Size of the model's offscreen buffer, which bounds the pictures.
+        # The offscreen buffer of the model limits the size of the images.
         model.vis.global_.offwidth = max(model.vis.global_.offwidth, width)
         model.vis.global_.offheight = max(model.vis.global_.offheight, height)
         try:
             self._renderer = mujoco.Renderer(model, height, width)
         except Exception as error:
             raise RuntimeError(
-                "no picture without OpenGL: apt-get install libegl1 libegl-mesa0, "
-                "set MUJOCO_GL=egl before mujoco is imported, or libosmesa6 and "
-                f"set osmesa ({error})"
+                "images need OpenGL: run apt-get install libegl1 libegl-mesa0 and set "
+                "MUJOCO_GL=egl before mujoco is imported, or install libosmesa6 and "
+                f"set MUJOCO_GL=osmesa ({error})"
             ) from error
-        # Close before MuJoCo ends OpenGL at the exit, if the environment is still open.
+        # If the environment is still open at the exit, close before MuJoCo ends OpenGL.
         atexit.register(_close, weakref.ref(self))
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = 0
@@ -60,7 +60,7 @@ class OffscreenRenderer:
         self._option.sitegroup[:] = 0
 
     def picture(self, qpos: Array, name: str, marks: Sequence[Mark] = ()) -> Array:
-        """Return the picture (H, W, 3) uint8 of a camera at ``qpos``, with marks."""
+        """Return the image (H, W, 3) uint8 of a camera at ``qpos``, with marks."""
         self._data.qpos[:] = qpos
         mujoco.mj_fwdPosition(self._model, self._data)
         self._renderer.update_scene(self._data, name, self._option)

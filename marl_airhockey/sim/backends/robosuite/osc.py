@@ -1,8 +1,8 @@
 """Operational space control: torques that move a paddle and press it on the table.
 
-Hybrid control in the table frame (Khatib, 1987): motion in the plane, a force along the
-normal, a fixed orientation. The torques of the contact (normal, orientation, gravity)
-have priority; the motion in the plane gets the remaining torque.
+Hybrid control in the table frame (Khatib, 1987) has three parts: motion in the plane, a
+force along the normal, and a fixed orientation. The torques of the contact (normal,
+orientation, gravity) have priority. The motion in the plane gets the remaining torque.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ class Gains:
     """Gains of the controller; damping follows from the stiffness."""
 
     plane: float = PARAMETERS["arm_stiffness"].default
-    """Stiffness of the position in the plane, 1/s2"""
+    """Stiffness of the position in the plane, 1/s2."""
     plane_ratio: float = 1.0
-    """Damping ratio in the plane"""
+    """Damping ratio in the plane."""
     lift: float = 400.0
-    """Stiffness toward the table of a paddle that has left it, 1/s2"""
+    """Stiffness toward the table of a paddle that has left it, 1/s2."""
     lift_ratio: float = 3.0
-    """Damping ratio along the normal"""
+    """Damping ratio along the normal."""
     kp_orientation: float = 1600.0
-    """Stiffness of the orientation, 1/s2"""
+    """Stiffness of the orientation, 1/s2."""
     orientation_ratio: float = 1.0
-    """Damping ratio of the orientation"""
+    """Damping ratio of the orientation."""
     correction: float = 5.0
-    """Largest acceleration beside that of the reference, m/s2"""
+    """Largest acceleration in addition to the reference acceleration, m/s2."""
     force: float = PARAMETERS["arm_force"].default
-    """Force on the table, N. With 20 N, and a fourth of the stiffness of the
-    orientation, a puck that is jammed in a corner could tip the paddle by 4 degrees."""
+    """Force on the table, N. With 20 N, and a quarter of the orientation stiffness, a
+    puck that is jammed in a corner could tilt the paddle by 4 degrees."""
 
     @property
     def array(self) -> Array:
@@ -65,23 +65,25 @@ def torques(
     """Compute the torques of the n joints of an arm.
 
     Args:
-        jacobian: (6, n) of the paddle's foot: velocity, angular velocity; world frame.
-        drift: (6,) its time derivative times the joint speeds.
-        mass: (n, n) joint-space inertia, overwritten.
-        bias: (n,) gravity, Coriolis and centrifugal torques.
-        speeds: (n,) joint speeds, rad/s.
-        position: (3,) of the foot in the table frame, m; z is its height.
-        rotation: (3, 3) from the foot to the world frame.
-        table: (3, 3) from the table frame to the world's.
-        wanted_rotation: (3, 3) wanted ``rotation``.
-        reference: (3, 2) wanted position, velocity and acceleration in the plane.
-        gains: (8,) of `Gains`.
-        low: (n,) smallest torques, Nm.
-        high: (n,) largest torques, Nm.
-        out: (n,) filled with the torques, Nm.
+        jacobian: Jacobian of the paddle's foot (6, n), world frame. The first three
+            rows are the velocity, the last three the angular velocity.
+        drift: Time derivative of the Jacobian times the joint speeds (6,).
+        mass: Joint-space inertia (n, n), overwritten.
+        bias: Gravity, Coriolis and centrifugal torques (n,), Nm.
+        speeds: Joint speeds (n,), rad/s.
+        position: Position of the foot (3,), table frame, m; z is the height.
+        rotation: Rotation from the foot to the world frame (3, 3).
+        table: Rotation from the table frame to the world frame (3, 3).
+        wanted_rotation: Target of ``rotation`` (3, 3).
+        reference: Target position (m), velocity (m/s) and acceleration (m/s2) in the
+            plane (3, 2), table frame.
+        gains: Gains (8,), see `Gains`.
+        low: Smallest torques (n,), Nm.
+        high: Largest torques (n,), Nm.
+        out: Torques (n,), Nm, filled.
 
     Returns:
-        The share of the motion in the plane that the torques allow, 0 to 1.
+        Share of the motion in the plane that the torque limits allow, 0 to 1.
     """
     twist, contact, motion = np.zeros(6), np.zeros(6), np.zeros(6)
     for i in range(6):
@@ -116,7 +118,7 @@ def _plane_acceleration(
     gains: Array,
     out: Array,
 ) -> None:
-    """Fill ``out`` (6,) with the wanted acceleration in the plane, world frame."""
+    """Fill ``out`` (6,) with the target acceleration in the plane, world frame."""
     velocity = _velocity(twist, table)
     damp = 2.0 * gains[1] * np.sqrt(gains[0])
     dx, dy = reference[0, 0] - position[0], reference[0, 1] - position[1]
@@ -164,7 +166,7 @@ def _contact_acceleration(
 def _to_forces(jacobian: Array, mass: Array, first: Array, second: Array) -> None:
     """Multiply two accelerations (6,) by the inertia at the foot, in place.
 
-    That inertia is (J M^-1 J^T)^-1; ``mass`` M is overwritten by its factor.
+    The inertia is (J M^-1 J^T)^-1. ``mass`` is M; its Cholesky factor overwrites it.
     """
     n = len(mass)
     solved = np.empty((6, n))
@@ -195,13 +197,13 @@ def _fit(
     """Fill ``out`` with torques within their limits; return the share of the motion.
 
     Args:
-        jacobian: (6, n) of the foot.
-        bias: (n,) Nm.
-        contact: (6,) force and torque at the foot that have priority.
-        motion: (6,) force and torque of the motion, of which a share is applied.
-        low: (n,) smallest torques, Nm.
-        high: (n,) largest torques, Nm.
-        out: (n,) filled, Nm.
+        jacobian: Jacobian of the foot (6, n), world frame.
+        bias: Gravity, Coriolis and centrifugal torques (n,), Nm.
+        contact: Force and torque at the foot that have priority (6,), N and Nm.
+        motion: Force and torque of the motion, of which a share is applied (6,).
+        low: Smallest torques (n,), Nm.
+        high: Largest torques (n,), Nm.
+        out: Torques (n,), Nm, filled.
     """
     n, share = len(bias), 1.0
     moving = np.zeros(n)
@@ -229,15 +231,15 @@ def subtract_payload(
     mass: Array,
     bias: Array,
 ) -> None:
-    """Subtract a point mass at the paddle's foot, which the controller does not know.
+    """Subtract a point mass at the paddle's foot that the controller does not know.
 
     Args:
-        load: mass, kg.
-        gravity: (3,) m/s2, world frame.
-        jacobian: (6, n) of the foot.
-        drift: (6,) its time derivative times the joint speeds.
-        mass: (n, n) joint-space inertia, changed.
-        bias: (n,) gravity, Coriolis and centrifugal torques, changed.
+        load: Mass, kg.
+        gravity: Gravity (3,), world frame, m/s2.
+        jacobian: Jacobian of the foot (6, n), world frame.
+        drift: Time derivative of the Jacobian times the joint speeds (6,).
+        mass: Joint-space inertia (n, n), changed.
+        bias: Gravity, Coriolis and centrifugal torques (n,), Nm, changed.
     """
     n = len(bias)
     for i in range(n):

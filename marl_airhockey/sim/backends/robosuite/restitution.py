@@ -1,4 +1,4 @@
-"""Restitution of contacts, as parameters of MuJoCo."""
+"""Restitution of contacts as contact parameters of MuJoCo."""
 
 from __future__ import annotations
 
@@ -7,32 +7,34 @@ import numpy as np
 from marl_airhockey.types import Array
 
 STIFFNESS = 0.19
-"""Root of a contact's stiffness times the time step. In a stiffer one the first step,
-which is partial, counts more: the restitution depends on the time of the contact within
-a step. In a softer one bodies overlap more."""
+"""Square root of a contact's stiffness, times the time step. The first step of a
+contact is partial. In a stiffer contact it matters more, so that the restitution
+depends on the time of the contact within a step. In a softer contact, bodies overlap
+more."""
 IMPEDANCE = 0.5
-"""Impedance d of contacts (solimp). A share 1 - d of each is a spring of its own mass,
-so a puck that a paddle jams against a rail stays soft. With d near 1, MuJoCo pushed the
-arm back as stiffly as the puck: with more than 200 N, which tipped the paddle."""
+"""Impedance d of contacts (solimp). A share 1 - d of each contact is a spring with a
+mass of its own, so that a puck stays soft if a paddle jams it against a rail. With d
+near 1, MuJoCo pushes the arm back as stiffly as the puck, with more than 200 N. This
+tilts the paddle."""
 PHASES = 32
-"""Number of times within a step at which contacts begin."""
+"""Number of simulated times within a step at which contacts begin."""
 MAX_STEPS = 200
-"""Longest contact, in steps."""
+"""Longest simulated contact, in steps."""
 
 
 def restitution_of(ratio: Array) -> Array:
-    """Compute the share of the speed that a damped spring, which only pushes, returns.
+    """Compute the restitution of damped springs that only push.
 
-    It is integrated as by MuJoCo, for contacts that begin at any time within a step;
-    the result is halfway between the least and the greatest share.
+    The integration is that of MuJoCo, for contacts that begin at different times within
+    a step. The result is halfway between the smallest and the largest restitution.
 
     Args:
-        ratio: (N,) damping ratios.
+        ratio: Damping ratios (N,).
 
     Returns:
-        (N,) shares.
+        Restitutions (N,).
     """
-    # Units: the time step and the speed before the contact.
+    # The units are the time step and the speed before the contact.
     begun = -(np.arange(PHASES) + 0.5) / PHASES
     depth = np.broadcast_to(begun, (len(ratio), PHASES)).copy()
     speed = -np.ones_like(depth)
@@ -49,11 +51,12 @@ _SHARES = restitution_of(_RATIOS)
 
 
 def solref(restitution: float | Array, timestep: float) -> Array:
-    """Return the direct solref (..., 2) of contacts with restitutions (...)."""
+    """Return solref in its direct form (..., 2) for restitutions (...)."""
     ratio = np.interp(-np.asarray(restitution), -_SHARES, _RATIOS)
-    # MuJoCo divides both by the impedance and applies a share of them. That were the
-    # impedance again, but the inverse mass that it uses is a mean over three
-    # axes: two thirds of that of a body which slides along two.
+    # MuJoCo divides both numbers by the impedance and applies a share of them. The
+    # share is not the impedance, because MuJoCo averages the inverse mass over three
+    # axes. For a body that slides along two axes, the mean is two thirds of its inverse
+    # mass.
     applied = IMPEDANCE / (IMPEDANCE + (1.0 - IMPEDANCE) * 2.0 / 3.0)
     scale = IMPEDANCE / applied
     stiffness = (STIFFNESS / timestep) ** 2

@@ -1,4 +1,4 @@
-"""Simulation: one world of arms with its own MuJoCo model and data."""
+"""Simulation: one world with arms, with a MuJoCo model and data of its own."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from marl_airhockey.sim.core.state import EVENTS, State
 from marl_airhockey.types import Array
 
 SAVED = mujoco.mjtState.mjSTATE_INTEGRATION
-"""Part of MuJoCo's state that the next step depends on."""
+"""Part of MuJoCo's state that determines the next step."""
 
 
 class Simulation:
     """MuJoCo simulation of robosuite's model: one world.
 
     Args:
-        env: robosuite environment of the model.
-        model: own copy of the model.
-        path: shape of the path in the output.
-        trace: (substeps, seats, len(TRACE)), filled at every step.
-        data: data of the environment, whose positions are the initial ones.
+        env: Robosuite environment of the model.
+        model: Copy of the model for this world.
+        path: Shape of the path in the output.
+        trace: Trace (substeps, seats, len(TRACE)), filled in every step.
+        data: Data of the environment with the initial positions.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Simulation:
         )
         self.output = make_output(scene, path, trace)
         self._reference = np.zeros((self._seats, 2))
-        """Positions of the references at the end of the last step (seats, 2), m."""
+        """Reference positions (seats, 2) at the end of the last step, m."""
         self._whole_side = np.array(
             [m.width is None for m in scene.goal_lines], np.bool_
         )
@@ -61,7 +61,7 @@ class Simulation:
         self._physics: dict[str, float] = {}
 
     def _arm_indices(self) -> Array:
-        """Return the indices of each arm (seats, 6): see `SimulationViews`."""
+        """Return the indices of each arm (seats, 6), see `SimulationViews`."""
         rows = []
         for i, robot in enumerate(self._env.robots):
             joint, dof, site = self._joints[i][0], self._dofs[i][0], self._sites[i]
@@ -78,7 +78,7 @@ class Simulation:
             plane=values["arm_stiffness"], force=values["arm_force"]
         ).array
         self.views.payloads[:] = values["arm_payload"]
-        # The body of the site has no mass of its own.
+        # The body of the site has no other mass.
         bodies = self.model.site_bodyid[self._sites]
         self.model.body_mass[bodies] = self.views.payloads
         self.table_physics.set_physics(values)
@@ -91,17 +91,17 @@ class Simulation:
         angle: Array,
         spin: Array,
     ) -> bool:
-        """Place all bodies; return True if arms were moved, which are at rest then.
+        """Place all bodies; return True if arms were moved, which are then at rest.
 
-        Arms are not changed if their paddles are already in position, as when a puck is
-        served. Otherwise nothing of the previous simulation remains.
+        Arms do not change if their paddles are already in position, for example when a
+        puck is served. Otherwise the previous simulation is cleared completely.
 
         Args:
-            static: static scene.
-            position: (bodies, 2) m.
-            velocity: (bodies, 2) m/s.
-            angle: (bodies,) rad.
-            spin: (bodies,) rad/s.
+            static: Static values of the scene.
+            position: Positions (bodies, 2), table frame, m.
+            velocity: Velocities (bodies, 2), table frame, m/s.
+            angle: Orientations (bodies,), rad.
+            spin: Angular velocities (bodies,), rad/s.
         """
         d, seats = self.data, self._seats
         moved = bool((position[:seats] != self.output.paddles[:, :2]).any())
@@ -141,15 +141,15 @@ class Simulation:
     def advance_reference(self, old: Array, new: Array, period: float) -> Array:
         """Advance the references by a step; return their positions at its beginning.
 
-        They continue those of the last step, but for `limit_lead`.
+        The references continue from the last step, within `limit_lead`.
 
         Args:
-            old: velocities at the beginning (seats, 2), m/s.
-            new: velocities at the end (seats, 2), m/s.
-            period: length of the step, s.
+            old: Velocities at the beginning (seats, 2), table frame, m/s.
+            new: Velocities at the end (seats, 2), table frame, m/s.
+            period: Length of the step, s.
 
         Returns:
-            Positions (seats, 2), m.
+            Positions (seats, 2), table frame, m.
         """
         start = limit_lead(self._reference, self.output.paddles[:, :2])
         out = np.empty((3, 2))
@@ -159,7 +159,7 @@ class Simulation:
         return start
 
     def park_pucks(self) -> None:
-        """Stop pucks that are through a goal line until they are served."""
+        """Stop pucks that have crossed a goal line until they are re-served."""
         through = (self.output.crossed & ~self._whole_side).any(-1)
         for puck in np.flatnonzero(through).tolist():
             self._out[puck] = True
@@ -170,7 +170,7 @@ class Simulation:
             self.table_physics.sliding.expected[puck] = np.nan
 
     def read(self, state: State, row: int) -> None:
-        """Fill a row of a state of all worlds."""
+        """Fill the row of this world in a state of all worlds."""
         d, seats, output = self.data, self._seats, self.output
         state.position[row, :seats] = output.paddles[:, :2]
         state.velocity[row, :seats] = output.paddles[:, 2:]
@@ -186,7 +186,7 @@ class Simulation:
             state.path[row] = output.path
 
     def save(self) -> dict[str, Any]:
-        """Return everything that `restore` requires, in fresh arrays."""
+        """Return everything that `restore` requires, in new arrays."""
         state = np.zeros(mujoco.mj_stateSize(self.model, SAVED))
         mujoco.mj_getState(self.model, self.data, state, SAVED)
         return {
@@ -200,7 +200,7 @@ class Simulation:
         }
 
     def restore(self, static: StaticScene, saved: dict[str, Any]) -> None:
-        """Continue from the state that another simulation of the model saved."""
+        """Continue from the saved state of another simulation of the same model."""
         self.set_physics(saved["physics"])
         for puck in np.flatnonzero(saved["out"]).tolist():
             self.table_physics.enable_contacts(puck, False)

@@ -1,9 +1,10 @@
-"""Sliding: laws of pucks and blocks that MuJoCo's contacts do not have.
+"""Sliding: physics of pucks and blocks that MuJoCo's contacts do not model.
 
-MuJoCo's contacts push along their normals alone, over several steps. What such a push
-changed in a step says its direction and size; friction then acts along the tangent, as
-in `core.laws.impulse`, so that over a contact it ends the slip or is friction times the
-push. The restitution at a wall follows from the speed at which a puck comes near.
+MuJoCo's contacts push only along their normals, over several steps. Direction and size
+of the normal impulse follow from the change of a puck's velocity in a step. Friction
+then acts along the tangent, as in `core.laws.impulse`. Over a contact it ends the slip,
+or its impulse is the friction coefficient times the normal impulse. The restitution at
+a wall follows from the speed at which a puck approaches.
 """
 
 from __future__ import annotations
@@ -17,47 +18,48 @@ from marl_airhockey.sim.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 MASS, GRIP, PULL_X, PULL_Y, DRAG, DAMPING = range(6)
-"""Columns of a body's coefficients: mass (kg), Coulomb friction (m/s2), pull along x
-and y (m/s2), quadratic (1/m) and linear drag (1/s)."""
+"""Columns of a body's coefficients: mass (kg), deceleration by Coulomb friction (m/s2),
+acceleration by the slope along x and y (m/s2), quadratic (1/m) and linear drag
+(1/s)."""
 AT_ONE, SLOPE, WALL, PADDLE, PUCK = range(5)
-"""Laws of a table: restitution of walls at 1 m/s, its loss per ln(m/s); friction at
-walls, paddles and pucks."""
+"""Contact parameters of a table: restitution of walls at 1 m/s, its loss per ln(m/s);
+friction at walls, paddles and pucks."""
 NEAR = 2e-3
-"""Gap up to which bodies may be in contact (m)."""
+"""Gap up to which bodies may be in contact, m."""
 SAME = 0.98
-"""Cosine of the angle between two directions that are the same."""
+"""Cosine of the largest angle between two directions that count as equal."""
 
 
 class Sliding(NamedTuple):
     """Arrays of the pucks and blocks of one table in one MuJoCo model."""
 
     place: Array
-    """Indices of x in qpos (movers,); y and the angle follow"""
+    """Indices of x in qpos (movers,), before y and the angle."""
     dofs: Array
-    """Indices of x in qvel (movers,)"""
+    """Indices of x in qvel (movers,), before y and the angle."""
     radius: Array
-    """Radii of a paddle and of pucks and blocks (1 + movers,), m"""
+    """Radii of a paddle, then of pucks and blocks (1 + movers,), m."""
     pucks: int
-    """Number of pucks, which are the first movers"""
+    """Number of pucks, which are the first movers."""
     coefficients: Array
-    """Coefficients (movers, 6)"""
+    """Coefficients of the bodies (movers, 6)."""
     laws: Array
-    """Laws (5,)"""
+    """Contact parameters of the table (5,)."""
     sides: Array
-    """Sides of the table (sides, 6): `walls.sides`"""
+    """Sides of the table (sides, 6), see `walls.sides`."""
     rails: Array
-    """Geoms of rails (G,)"""
+    """Indices of the geoms of rails (G,)."""
     rail_side: Array
-    """Side of each rail (G,)"""
+    """Side of each rail (G,)."""
     damping: Array
-    """Damping of contacts at restitutions 0, 0.01 .. 1 (101,), as in solref"""
+    """Damping in solref of contacts with restitution 0, 0.01 .. 1 (101,)."""
     solref: Array
-    """MuJoCo's solref (geoms, 2), changed for rails"""
+    """Array solref of MuJoCo (geoms, 2), changed for rails."""
     expected: Array
-    """Velocities that the pucks have after the step without contacts (pucks, 2), m/s;
-    persists; nan where that is not known"""
+    """Velocities of the pucks after a step without contacts (pucks, 2), m/s; nan if
+    they are unknown. Persists."""
     approach: Array
-    """Speeds at which pucks came to the sides (pucks, sides), m/s; persists"""
+    """Approach speeds of the pucks to the sides (pucks, sides), m/s; persists."""
 
 
 @compiled()
@@ -69,15 +71,15 @@ def apply_laws(
     forces: Array,
     dt: float,
 ) -> None:
-    """Apply the laws of pucks and blocks before a physics step.
+    """Apply drag, friction and restitution to pucks and blocks before a physics step.
 
     Args:
-        sliding: arrays of the table.
-        paddles: x, y, vx, vy of the paddles (seats, 4), table frame.
-        places: qpos.
-        speeds: qvel, changed for pucks.
-        forces: qfrc_applied (nv,), filled for pucks and blocks.
-        dt: length of a physics step, s.
+        sliding: Arrays of the table.
+        paddles: Columns x, y, vx, vy of the paddles (seats, 4), table frame.
+        places: Array qpos of MuJoCo (nq,).
+        speeds: Array qvel of MuJoCo (nv,), changed.
+        forces: Array qfrc_applied of MuJoCo (nv,), filled for pucks and blocks.
+        dt: Length of a physics step, s.
     """
     coefficients = sliding.coefficients
     for i in range(sliding.pucks):
@@ -91,7 +93,7 @@ def apply_laws(
             speeds[k], speeds[k + 1] = vx, vy
             push = -row[DRAG] * np.hypot(vx, vy)
             forces[k], forces[k + 1] = row[MASS] * push * vx, row[MASS] * push * vy
-            # MuJoCo is implicit in linear drag.
+            # MuJoCo integrates linear drag implicitly.
             left = 1.0 / (1.0 + dt * row[DAMPING])
             sliding.expected[i, 0] = left * (vx + dt * (row[PULL_X] + push * vx))
             sliding.expected[i, 1] = left * (vy + dt * (row[PULL_Y] + push * vy))
@@ -109,7 +111,7 @@ def apply_laws(
 def _rub(
     sliding: Sliding, i: int, paddles: Array, places: Array, speeds: Array
 ) -> None:
-    """Let what pushed puck i in the last step rub on it."""
+    """Apply the friction of the body that pushed puck i in the last step."""
     k, at = sliding.dofs[i], sliding.place[i]
     nx, ny = speeds[k] - sliding.expected[i, 0], speeds[k + 1] - sliding.expected[i, 1]
     push = np.hypot(nx, ny)
@@ -130,7 +132,7 @@ def _rub(
         if j == i or not _pushes(dx, dy, nx, ny, touch):
             continue
         if j < i and j < sliding.pucks:
-            # The other puck has rubbed both.
+            # The call for the other puck has changed both.
             return
         friction, other = sliding.laws[PUCK], j
         d = sliding.dofs[j]
@@ -139,7 +141,7 @@ def _rub(
         if j < sliding.pucks:
             slip -= sliding.radius[1 + j] * speeds[d + 2]
     spins = 2.0 if 0 <= other < sliding.pucks else 0.0
-    # In units of the puck's mass; the push is the normal impulse.
+    # Masses are in units of the puck's mass; the push is the normal impulse.
     _, rub = impulse(push, slip, 0.0, friction, 1.0, 3.0 + mass + spins)
     speeds[k] -= rub * ny
     speeds[k + 1] += rub * nx
@@ -153,14 +155,14 @@ def _rub(
 
 @inner()
 def _pushes(dx: float, dy: float, nx: float, ny: float, touch: float) -> bool:
-    """Return True if a body may push along a normal; (dx, dy) leads from it, m."""
+    """Return True if a body may push along a normal; (dx, dy) points from it, m."""
     distance = np.hypot(dx, dy)
     return bool(0.0 < distance < touch + NEAR and nx * dx + ny * dy > SAME * distance)
 
 
 @inner()
 def _set_restitutions(sliding: Sliding, places: Array, speeds: Array) -> None:
-    """Set the restitutions of rails for the pucks that are nearest to them."""
+    """Set the restitution of each side's rails for the puck that is nearest to it."""
     if sliding.laws[SLOPE] == 0.0:
         return
     for s in range(len(sliding.sides)):

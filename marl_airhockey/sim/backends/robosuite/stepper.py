@@ -1,4 +1,4 @@
-"""Stepper: a control step of one world in compiled code that calls MuJoCo."""
+"""Stepper: control step of one world in compiled code that calls MuJoCo."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from marl_airhockey.sim.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 RELEASE = 0.001
-"""Distance from a rail up to which a puck that touched it still does (m)."""
+"""Distance from a rail up to which a contact of a puck persists, m."""
 
 
 @compiled(nogil=True)
@@ -37,14 +37,14 @@ def advance(
     """Advance a world by a control step; its derived arrays must be up to date.
 
     Args:
-        sim: `SimulationViews` of the world; see `refresh`.
-        static: `StaticScene`.
-        output: `StepOutput`, filled.
-        start: initial positions of the references (seats, 2), m.
-        old: initial velocities of the references (seats, 2), m/s.
-        new: final velocities of the references (seats, 2), m/s.
-        dt: length of a physics step, s.
-        substeps: number of physics steps.
+        sim: Views of the world, `SimulationViews`; `refresh` updates its arrays.
+        static: Static values, `StaticScene`.
+        output: Output of the step, `StepOutput`, filled.
+        start: Initial positions of the references (seats, 2), table frame, m.
+        old: Initial velocities of the references (seats, 2), table frame, m/s.
+        new: Final velocities of the references (seats, 2), table frame, m/s.
+        dt: Length of a physics step, s.
+        substeps: Number of physics steps.
     """
     seats, nv = len(sim.arms), len(sim.qvel)
     jacobian, rate, mass = np.empty((6, nv)), np.empty((6, nv)), np.empty((nv, nv))
@@ -73,7 +73,7 @@ def advance(
 
 @compiled()
 def refresh(sim: Any, static: Any, output: Any) -> None:
-    """Update a world's derived arrays, paddles and contacts from its positions."""
+    """Update derived arrays, paddles and contacts of a world from its positions."""
     step1(sim.model, sim.data)
     _measure(sim, static, output, 0, np.empty((6, len(sim.qvel))))
     _detect_events(sim, static, output, 0.0)
@@ -89,16 +89,17 @@ def _command_arm(
     jacobian: Array,
     rate: Array,
 ) -> float:
-    """Write the torques of an arm to ``ctrl``; return the share as `torques` does.
+    """Write the torques of an arm to ``ctrl``; return the result of `torques`.
 
     Args:
-        sim: `SimulationViews`.
-        static: `StaticScene`.
-        s: seat.
-        wanted: (3, 2) position, velocity and acceleration of the reference.
-        mass: (nv, nv) joint-space inertia.
-        jacobian: (6, nv) work space.
-        rate: (6, nv) work space.
+        sim: Views of the world, `SimulationViews`.
+        static: Static values, `StaticScene`.
+        s: Index of the seat.
+        wanted: Position (m), velocity (m/s) and acceleration (m/s2) of the reference
+            (3, 2), table frame.
+        mass: Joint-space inertia (nv, nv).
+        jacobian: Work space (6, nv).
+        rate: Work space (6, nv).
     """
     _, joint, motor, site, body, _ = sim.arms[s]
     linear, angular = jacobian.ctypes.data, jacobian[3:].ctypes.data
@@ -177,7 +178,7 @@ def _measure(sim: Any, static: Any, output: Any, k: int, jacobian: Array) -> Non
 
 @inner()
 def _detect_events(sim: Any, static: Any, output: Any, elapsed: float) -> None:
-    """Detect contacts that begin and goal lines that are crossed, ``elapsed`` s in."""
+    """Detect new contacts and crossed goal lines at ``elapsed`` s into the step."""
     near = static.radius[0] + static.radius[1]
     for p in range(static.pucks):
         x, y = sim.qpos[sim.movers[p, 0]], sim.qpos[sim.movers[p, 0] + 1]
@@ -192,7 +193,7 @@ def _detect_events(sim: Any, static: Any, output: Any, elapsed: float) -> None:
         for s in range(len(static.sides)):
             nx, ny, offset, mx, my, half = static.sides[s]
             aside = nx * (y - my) - ny * (x - mx)
-            # A puck at rest on a rail sinks in and rises by less than `RELEASE`.
+            # The distance of a puck at rest on a rail varies by less than `RELEASE`.
             limit = static.radius[1] + (RELEASE if output.against[p, s] else 0.0)
             touches = nx * x + ny * y + offset < limit and abs(aside) >= half
             if touches and not output.against[p, s]:

@@ -1,4 +1,4 @@
-"""Table physics in MuJoCo: gravity, drag, friction, restitution of sliding bodies."""
+"""Table physics in MuJoCo: gravity, drag, friction and restitution of bodies."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class TablePhysics:
     """Physics of the pucks and blocks in one MuJoCo model.
 
     Args:
-        scene: scene of the model.
-        frame: frame of the table.
-        model: MuJoCo's model.
-        data: its data.
+        scene: Scene of the model.
+        frame: Frame of the table.
+        model: MuJoCo model.
+        data: MuJoCo data.
     """
 
     def __init__(self, scene: Scene, frame: TableFrame, model: Any, data: Any) -> None:
@@ -34,9 +34,9 @@ class TablePhysics:
         names += [f"block{k}" for k in range(scene.blocks)]
         joints = [model.joint(f"{name}_x") for name in names]
         self.qpos_index = np.array([j.qposadr[0] for j in joints], np.int64)
-        """Indices of x in qpos (movers,); y and the angle follow."""
+        """Indices of x in qpos (movers,), before y and the angle."""
         self.dofs = np.array([j.dofadr[0] for j in joints], np.int64)
-        """Indices of x in qvel (movers,); y and the angle follow."""
+        """Indices of x in qvel (movers,), before y and the angle."""
         self._bodies = [model.body(name).id for name in names]
         self._sides = [model.geom(name).id for name in names]
         geoms = [model.geom(k).name for k in range(model.ngeom)]
@@ -49,7 +49,7 @@ class TablePhysics:
         ]
         for k in (*self._paddles, *self._feet):
             model.geom_size[k, 0] = scene.table.paddle_radius
-        # The same at every depth: the first two numbers.
+        # With equal first numbers, the impedance is the same at every depth.
         model.geom_solimp[[*self._walls, *self._paddles, *self._sides], :2] = IMPEDANCE
         rails = [(k, n) for k, n in enumerate(geoms) if n.startswith("rail")]
         rails = [(k, n) for k, n in rails if not n.endswith("visual")]
@@ -108,23 +108,23 @@ class TablePhysics:
             model.body_mass[body] = mass
             model.dof_damping[dof : dof + 2] = values["puck_damping"] * mass
             model.dof_damping[dof + 2] = 0.0
-        # Contacts are scaled by inverse masses, which `mj_setConst` derives anew.
+        # Inverse masses scale contacts; `mj_setConst` computes them again.
         kept = self._data.qpos.copy(), self._data.qvel.copy()
         mujoco.mj_setConst(model, self._data)
         self._data.qpos[:], self._data.qvel[:] = kept
 
     def apply_laws(self, paddles: Array) -> None:
-        """Apply the laws of pucks and blocks, before a physics step.
+        """Apply drag, friction and restitution to bodies before a physics step.
 
         Args:
-            paddles: x, y, vx, vy of the paddles (seats, 4), table frame.
+            paddles: Columns x, y, vx, vy of the paddles (seats, 4), table frame.
         """
         data, dt = self._data, self._model.opt.timestep
         motion = data.qpos, data.qvel, data.qfrc_applied
         apply_laws(self.sliding, paddles, *motion, dt)
 
     def forget(self) -> None:
-        """Forget the contacts of the last step, as bodies were placed anew."""
+        """Clear the contacts of the last step after bodies were placed."""
         self.sliding.expected[:], self.sliding.approach[:] = np.nan, 0.0
 
     def enable_contacts(self, puck: int, enabled: bool) -> None:
