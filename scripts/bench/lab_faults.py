@@ -11,7 +11,7 @@ switched on. Faults that were reported by others are omitted, see
 * the time until the true paddle is at rest permanently (below 0.01 m/s),
 * the distance that the paddle moves after the end of the episode.
 
-It takes about 25 minutes, or four with ``--alone``, in real time. Nothing else should
+It takes about 30 minutes, or three with ``--alone``, in real time. Nothing else should
 run at the same time. Faults whose rows are in the file are not measured again, so the
 script can be interrupted. ``--summary`` prints the pairs of the file by reason.
 """

@@ -11,17 +11,23 @@ SKIPPED = 8
 WEIGHT = 0.1
 """Weight of the newest innovation in their mean."""
 LARGEST, MULTIPLE = 0.03, 20.0
-"""Largest value that an innovation counts with, m, and as a multiple of the usual one.
-One wrong sighting then adds at most 3 mm, or twice the usual innovation, to the mean,
-which is not enough."""
+"""Largest value that an innovation counts with, m, and as a multiple of the usual
+one."""
+IMPOSSIBLE = 0.4
+"""Innovation, m, that no motion of a puck causes: 12 m/s between two frames. It counts
+in full."""
 USUAL = 0.001
 """First value of the usual innovation, m."""
 LEARNING = 0.02
 """Share by which the usual innovation changes with each sighting."""
 LEAST, FACTOR = 0.005, 4.0
 """Mean innovation that is too large, m, and as a multiple of the usual one. In the
-virtual lab the mean stays below 3 mm; it reaches 7 mm when the camera is moved by
-2 cm."""
+virtual lab it is exceeded after wrong sightings, or when a paddle squeezes the puck
+against a wall and shoots it away: for a few sightings, and rarely."""
+LASTING, AGAIN = 12, 100
+"""Number of sightings for which the mean must be too large, or within which it must
+become so a second time. A second puck does the first. With a camera that was moved by
+2 cm, every hit of the paddle is predicted wrongly."""
 
 
 class Innovations:
@@ -37,7 +43,9 @@ class Innovations:
 
     def restart(self) -> None:
         """Begin an episode."""
-        self._count, self.mean = 0, self.usual
+        self._count = self._above = 0
+        self._exceeded, self._again = -AGAIN, False
+        self.mean = self.usual
         """Mean of the last innovations, m."""
 
     def add(self, innovation: Array) -> None:
@@ -47,13 +55,21 @@ class Innovations:
             return
         size = float(np.linalg.norm(innovation))
         self.usual *= 1.0 + LEARNING * (1.0 if size > self.usual else -1.0)
-        largest = max(LARGEST, MULTIPLE * self.usual)
-        self.mean += WEIGHT * (min(size, largest) - self.mean)
+        if size < IMPOSSIBLE:
+            size = min(size, max(LARGEST, MULTIPLE * self.usual))
+        self.mean += WEIGHT * (size - self.mean)
+        if self.mean <= max(LEAST, FACTOR * self.usual):
+            self._above = 0
+            return
+        if not self._above:
+            self._again = self._count - self._exceeded < AGAIN
+            self._exceeded = self._count
+        self._above += 1
 
     @property
     def trouble(self) -> str:
         """Reason why the sightings cannot be those of one puck; "" if they can be."""
-        if self.mean <= max(LEAST, FACTOR * self.usual):
+        if self._above < LASTING and not (self._above and self._again):
             return ""
         return (
             f"puck: seen {1e3 * self.mean:.0f} mm from its prediction, usually "

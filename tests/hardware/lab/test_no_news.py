@@ -79,6 +79,22 @@ def test_jumps_that_stay_are_trouble_in_proportion_to_the_usual_size(usual):
     assert "is there a second one" in innovations(before + after).trouble
 
 
+SHOT_AWAY = [4.0, 43.0, 148.0, 111.0]
+"""Innovations when a paddle squeezes the puck against a wall, mm"""
+
+
+def test_one_hit_that_was_predicted_wrongly_is_no_trouble_and_two_are():
+    sizes = [0.7] * 50 + SHOT_AWAY + [0.7] * 40
+    for end in range(len(sizes)):
+        assert innovations(sizes[:end]).trouble == ""
+    assert "did the camera move" in innovations(sizes + SHOT_AWAY).trouble
+
+
+def test_a_jump_to_a_second_puck_is_trouble():
+    sizes = [0.7] * 50 + [600.0] + [0.7] * 15
+    assert "is there a second one" in innovations(sizes).trouble
+
+
 def test_the_first_sightings_of_an_episode_do_not_count():
     made = Innovations()
     for _ in range(SKIPPED):
