@@ -15,6 +15,7 @@ from marl_airhockey.hardware.robot.config import (
     PAYLOADS,
     Pendant,
     RobotConfig,
+    ServoSettings,
     check_pendant,
     check_tool,
 )
@@ -69,6 +70,8 @@ class Rig:
     pendant: Pendant = field(default_factory=Pendant)
     smoothing: Smoothing = field(default_factory=Smoothing)
     """Filter of the commands."""
+    servo: ServoSettings = field(default_factory=ServoSettings)
+    """Settings of the control loops in the controller, and the usual lag of the arm."""
     operator: str = "person"
     """Operator who puts the puck on the table, "person" or "lab:PORT"."""
     paddle: Colour | None = None
@@ -98,6 +101,7 @@ class Rig:
             tool=self.tool,
             payload=self.payload,
             smoothing=self.smoothing,
+            servo=self.servo,
             pendant=self.pendant,
         )
 

@@ -10,7 +10,7 @@ from marl_airhockey.build import table_keywords
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.lab.table_camera import lab_view, tag_places
 from marl_airhockey.hardware.rig import Pendant, Rig
-from marl_airhockey.hardware.robot import ServoSettings
+from marl_airhockey.hardware.robot.config import ServoSettings
 from marl_airhockey.hardware.robot.shaper import MotionLimits
 from marl_airhockey.hardware.vision import Colour
 from marl_airhockey.hardware.vision.calibration import tag_corners
@@ -115,6 +115,7 @@ BROKEN = [
     ("tags", {"seven": [[0, 0]] * 4}, "tags: 'seven'"),
     ("tags", {"7": [[0, 0]] * 3}, "tags: '7'"),
     ("smoothing", {"name": "median"}, "smoothing.name: unknown filter 'median'"),
+    ("servo.lag", 0.0, "servo.lag"),
     ("puck", [1, 2], "puck: .*expected an object"),
 ]
 
@@ -123,6 +124,12 @@ BROKEN = [
 def test_a_broken_field_is_named(tmp_path, path, value, words):
     with pytest.raises(ValueError, match=words):
         Rig.load(saved(tmp_path, path, value))
+
+
+def test_the_lag_of_a_rig_is_that_of_its_robot(tmp_path):
+    known = Rig.load(saved(tmp_path, "servo.lag", 0.09))
+    config = known.robot_config(make_seat("robot", TABLE, 0).reach)
+    assert config.servo == ServoSettings(lag=0.09)
 
 
 def test_no_number_of_a_rig_may_be_nan_or_infinite(tmp_path):

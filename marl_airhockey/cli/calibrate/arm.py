@@ -21,8 +21,8 @@ from marl_airhockey.types import Array
 if TYPE_CHECKING:
     from marl_airhockey.hardware.calibration.arm import ArmTrial
 
-NAMES = "action_delay", "servo_time"
-"""Parameters that are measured."""
+NAMES = "action_delay", "servo_time", "lag"
+"""Quantities that are measured: two parameters of profiles, and the servo's lag."""
 
 
 def arm(
@@ -73,6 +73,7 @@ def arm(
         table.add_row(trial.motion, trial.axis, *cells, f"{1e3 * found[2]:.2f}")
     console.print(table)
     console.print(_in_words(trials))
+    console.print(f'in the rig file: "servo": {{"lag": {values["lag"]["mean"]:.3f}}}')
 
 
 def _response(trials: Sequence[ArmTrial]) -> dict[float, Array]:

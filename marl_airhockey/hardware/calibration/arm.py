@@ -63,6 +63,14 @@ class ArmTrial:
     response: dict[float, tuple[float, float]]
     """Gain and phase, deg, by frequency, Hz; empty for steps."""
 
+    @property
+    def lag(self) -> float:
+        """Time by which the arm lags at constant velocity, s (`ServoSettings.lag`).
+
+        It is the dead time plus 2 / w of a critically damped lag of frequency w.
+        """
+        return self.action_delay + 2.0 * self.servo_time / HALF
+
 
 def measure_arm(
     rig: Rig,

@@ -68,6 +68,7 @@ def test_the_lab_s_arm_is_as_slow_as_its_controller_says(rig):
     found = find_lag(motion, 1, "steps")
     assert found.servo_time == pytest.approx(HALF_RISE, abs=0.006)
     assert found.action_delay < 0.02
+    assert found.lag == pytest.approx(ServoSettings().lag, abs=0.006)
     assert found.misfit < 0.002
 
 
