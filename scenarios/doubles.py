@@ -10,7 +10,7 @@ from marl_airhockey.toolkit.versus import Versus
 
 @dataclass(frozen=True, kw_only=True)
 class Doubles(Versus):
-    """Game of two teams of two players.
+    """Game with two players in each team.
 
     Start:
         The paddles of a team are side by side in front of their goal. The puck is

@@ -9,7 +9,7 @@ from marl_airhockey.toolkit.versus import Versus
 
 @dataclass(frozen=True, kw_only=True)
 class Duel(Versus):
-    """Game of two players at opposite ends.
+    """Game with one player in each team.
 
     Start:
         Each paddle is in front of its goal. The puck is served from the centre to one

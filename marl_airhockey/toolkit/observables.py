@@ -25,11 +25,11 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class OwnPaddle(Observable):
-    """Position and velocity of the own paddle, m and m/s (delayed: with latency).
+    """Position and velocity of the own paddle; `delayed`: at the time of the rest.
 
-    The robot of the seat reports them. With a reaction time, the delayed values follow:
-    those at the time of all other observations. An estimate or a history also contains
-    the last actions, which may not have taken effect yet.
+    The robot of the seat reports them, in m and m/s. With an observation latency the
+    delayed values follow: those at the time of all other observations. An estimate or a
+    history also contains the last actions, which may not have taken effect yet.
     """
 
     def columns(self, scope: ObservationContext) -> list[Element]:
@@ -103,7 +103,7 @@ def _others(scene: Scene) -> Array:
 
 @dataclass(frozen=True)
 class Pucks(Observable):
-    """Position, velocity and spin of each puck, m and m/s (predicted: for now).
+    """Position, velocity and spin of each puck; `predicted`: extrapolated to now.
 
     The spin is the speed of the edge, radius times angular velocity, counter-clockwise.
     With a reaction time, position and velocity for now follow, see

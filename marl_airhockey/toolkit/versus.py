@@ -20,14 +20,15 @@ from marl_airhockey.types import Array, Memory
 
 @dataclass(frozen=True, kw_only=True)
 class Versus(Scenario):
-    """Game of two teams with a goal at each end.
+    """Game of two teams, each with a goal at its own end.
 
-    A goal gives its team a reward of 1 and the other team -1. The first team with
-    ``goals_to_win`` goals, and more than the other team, wins. If the time limit ends a
-    level game, the team with more shots on goal wins, so that attacking is worth more
-    than waiting. After a goal the puck is served from the centre to the team that
-    conceded it. A team that has the puck within reach for ``possession`` seconds loses
-    it to the other team. A puck that rests out of reach of all paddles is re-served.
+    A team that scores gets a reward of 1, and the other team -1. The first team that
+    has ``goals_to_win`` goals, and more goals than the other team, wins. If goals are
+    equal at the time limit, the team with more shots on goal wins, so that attacking is
+    worth more than waiting. After a goal the puck is served from the centre to the team
+    that conceded it. A team that has the puck within reach for ``possession`` seconds
+    loses it to the other team. A puck that rests out of reach of all paddles, or that
+    both teams have within reach for ``possession`` seconds, is re-served.
     """
 
     announced = ("goals", "stopped", "serve")
@@ -140,10 +141,10 @@ class Versus(Scenario):
     def reward_terms(self, t: Transition) -> dict[str, Array]:
         """Return the reward terms.
 
-        goal: ``scored_weight`` for each goal of the own team, -1 for each goal of the
-        other team.
-        shot: ``shot_weight`` for each stopped shot on goal of the own team, and
-        ``-shot_weight`` for each stopped shot of the other team.
+        goal: ``scored_weight`` for each goal that the own team scores, -1 for each that
+        the other team scores.
+        shot: ``shot_weight`` for each shot on goal by the own team that was stopped,
+        ``-shot_weight`` for each by the other team; only if ``shot_weight`` is not 0.
         """
         scored = t.new_memory["goals"] - t.memory["goals"]
         goal = self.scored_weight * scored - scored[..., ::-1]
@@ -157,7 +158,7 @@ class Versus(Scenario):
     def _leads(self, memory: Memory) -> Array:
         """Return True (..., 2) for the team with more goals.
 
-        If goals are equal, the team with more stopped shots on goal leads. At most one
+        If goals are equal, the team that made more shots on goal leads. At most one
         team leads.
         """
         goals, stopped = memory["goals"], memory["stopped"]
@@ -196,7 +197,7 @@ class Versus(Scenario):
     def success(self, t: Transition) -> Array:
         """(..., seats) bool: The team leads at the end of the game.
 
-        It has more goals, or equal goals and more stopped shots on goal.
+        It has scored more goals, or equally many and made more shots on goal.
         """
         over = self.terminated(t) | t.time_limit_reached
         return np.asarray(

@@ -9,6 +9,7 @@ the rows of the files in ``docs/data``.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from statistics import mean
 from typing import Annotated, Any
@@ -20,16 +21,14 @@ from rows import DATA, read
 
 import marl_airhockey as ah
 from marl_airhockey.envs.describe import describe
+from marl_airhockey.sim.contracts.scenario import Scenario
 
 STARTS = 1000
 """Number of starts of which the ranges are shown, and of episodes of random actions"""
+COMMON = {field.name for field in fields(Scenario)}
+"""Options of all scenarios"""
 WIDTH = 720
 """Width of an image, pixels"""
-COMMON = {
-    *("seats", "table", "goals", "rules", "obstacles", "reward_regions"),
-    *("drag_regions", "jitter_weight", "turning_weight", "reaction", "seconds"),
-}
-"""Options of all scenarios, which have a page of their own"""
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> list[str]:
@@ -89,7 +88,8 @@ def results(name: str) -> list[str]:
 
 def page(name: str) -> str:
     """Return the page of a scenario."""
-    data, seats = describe(name), ah.make_scenario(name).scene.seats
+    data, scenario = describe(name), ah.make_scenario(name)
+    seats = scenario.scene.seats
     size = len(data["observation"])
     agents = (
         f"`paddle_0` to `paddle_{len(seats) - 1}`" if len(seats) > 1 else "`paddle_0`"
@@ -102,6 +102,7 @@ def page(name: str) -> str:
         ("agents", agents),
         ("action", "`Box(-1, 1, (2,))`: target velocity / top speed, ego frame"),
         ("observation", f"`Box({size},)`"),
+        ("latency by the rules", f"{scenario.reaction:g} s"),
         ("top speed", f"{seats[0].speed:g} m/s"),
         ("time limit", f"{data['seconds']:g} s, 20 steps per second"),
     ]
@@ -114,8 +115,8 @@ def page(name: str) -> str:
     meanings = dict.fromkeys(e["meaning"] for e in data["observation"])
     options = [
         (f"`{o['option']}`", f"`{o['default']}`", o["meaning"].replace("|", "\\|"))
-        for o in data["options"]
-        if o["option"] not in COMMON
+        # Those of the base class are last.
+        for o in sorted(data["options"], key=lambda o: o["option"] in COMMON)
     ]
     lines = [
         f"# {name.replace('_', ' ').capitalize()}",
@@ -160,12 +161,9 @@ def page(name: str) -> str:
         "",
         *results(name),
     ]
-    if options:
-        lines += ["## Options", ""]
-        lines += [*table(("option", "default", "meaning"), options), ""]
-    lines += [
-        "The [options of all scenarios](../environments.md) can be set in addition."
-    ]
+    lines += ["## Options", ""]
+    lines += [*table(("option", "default", "meaning"), options), ""]
+    lines += ["[Obstacles and regions](../scene_options.md) has examples."]
     return "\n".join(lines) + "\n"
 
 

@@ -125,7 +125,7 @@ def test_sentences_of_the_readme_are_those_of_the_rows():
     text = " ".join((ROOT / "README.md").read_text().split())
     rows = [r for r in rows_of("tasks.csv") if r["profile"] == "ideal"]
     slowest = max(float(row["cpu_seconds_to_0.95"]) for row in rows)
-    assert f"reaches 0.95 within {math.ceil(slowest)} CPU-seconds" in text
+    assert f"reaches a success of 0.95 within {math.ceil(slowest)} CPU-seconds" in text
     rates = [r["env_steps_per_cpu_s"] for r in json.loads(SPEED.read_text())]
     assert f"up to {max(rates) / 1e6:.0f} million environment steps" in text
     assert f"{len(rows_of('datasets.csv'))} datasets" in text
