@@ -27,7 +27,7 @@ def list_scenarios(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List scenarios, drivers, policies, backends and profiles, or describe one.
+    """List everything by name, or describe a scenario or a profile.
 
     The description of a scenario lists its start, termination, success, seats,
     observation, reward terms and options.

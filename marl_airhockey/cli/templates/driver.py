@@ -34,6 +34,7 @@ class Template(Driver):
         target = np.where(ready[:, None], beyond, place)
         # An action is the target velocity divided by the top speed. Store values for
         # later steps in the memory, as arrays with one row per world, not in `self`.
+        # `def reset(self, seat, rng, worlds)` returns the memory at the start.
         return (target - own) * self.gain / view.top_speed[:, None], memory
 
 

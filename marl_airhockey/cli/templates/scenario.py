@@ -33,6 +33,12 @@ class Template(Scenario):
     The puck must bounce off ``banks`` walls between two touches. A touch before the
     last wall bounce resets the count. Describe here what the task rewards, and why
     there is no easier way to obtain the reward.
+
+    Start:
+        The paddle is near the home end, and the puck rests in front of it.
+
+    Termination:
+        Success.
     """
 
     # The fields are the options of the task, `--option banks=2`. The docstring of each

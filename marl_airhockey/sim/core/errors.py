@@ -31,7 +31,8 @@ def require(module: str, extra: str) -> None:
     """
     if importlib.util.find_spec(module) is None:
         raise RuntimeError(
-            f"{module} is not installed: pip install 'marl_airhockey[{extra}]'"
+            f"{module} is not installed: pip install 'marl_airhockey[{extra}]', or "
+            f"'.[{extra}]' in a clone"
         )
 
 
