@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from marl_airhockey.sim.core.parameters import PUCK_SPEED_CAP
 from marl_airhockey.types import Array
 
 SKIPPED = 8
@@ -13,9 +14,6 @@ WEIGHT = 0.1
 LARGEST, MULTIPLE = 0.03, 20.0
 """Largest value that an innovation counts with, m, and as a multiple of the usual
 one."""
-IMPOSSIBLE = 0.4
-"""Innovation, m, that no motion of a puck causes: 12 m/s between two frames. It counts
-in full."""
 USUAL = 0.001
 """First value of the usual innovation, m."""
 LEARNING = 0.02
@@ -48,14 +46,20 @@ class Innovations:
         self.mean = self.usual
         """Mean of the last innovations, m."""
 
-    def add(self, innovation: Array) -> None:
-        """Add an innovation (2,), m."""
+    def add(self, innovation: Array, since: float) -> None:
+        """Add an innovation.
+
+        Args:
+            innovation: Sighting minus its prediction (2,), m.
+            since: Time since the last sighting, s. An innovation that is larger than
+                any puck moves in this time counts in full.
+        """
         self._count += 1
         if self._count <= SKIPPED:
             return
         size = float(np.linalg.norm(innovation))
         self.usual *= 1.0 + LEARNING * (1.0 if size > self.usual else -1.0)
-        if size < IMPOSSIBLE:
+        if size < PUCK_SPEED_CAP * since:
             size = min(size, max(LARGEST, MULTIPLE * self.usual))
         self.mean += WEIGHT * (size - self.mean)
         if self.mean <= max(LEAST, FACTOR * self.usual):

@@ -113,13 +113,14 @@ class Tracker:
             return
         if last is not None:
             self._update(np.zeros(2), 0.0, False, track, taken)
-            self.innovations.add(sighting.place - self._estimator.now[0, 0, :2])
+            off = sighting.place - self._estimator.now[0, 0, :2]
+            self.innovations.add(off, taken - last.time)
         # The filtered position at the time of the frame itself.
         self._update(sighting.place, taken, True, track, taken)
         found = self._estimator.now[0, 0]
         new = self.last = MeasuredPuck(taken, found[:2].copy(), found[2:4].copy())
-        off = float(np.linalg.norm(new.place - sighting.place))
-        self.noise += SMOOTHED * (off - self.noise)
+        apart = float(np.linalg.norm(new.place - sighting.place))
+        self.noise += SMOOTHED * (apart - self.noise)
         if last is None:
             return
         met = find_contacts(self._scene, last, new, track[:, 0], track[:, 1:])

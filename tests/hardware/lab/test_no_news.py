@@ -54,11 +54,15 @@ def test_a_few_repeats_are_no_trouble():
     assert found == ""
 
 
+FRAME = 1 / 30
+"""Time between two sightings, s"""
+
+
 def innovations(sizes):
     """Return the innovations of some sizes, mm."""
     made = Innovations()
     for size in [1.0] * SKIPPED + list(sizes):
-        made.add(np.array([1e-3 * size, 0.0]))
+        made.add(np.array([1e-3 * size, 0.0]), FRAME)
     return made
 
 
@@ -95,11 +99,19 @@ def test_a_jump_to_a_second_puck_is_trouble():
     assert "is there a second one" in innovations(sizes).trouble
 
 
+def test_a_puck_that_was_hidden_for_a_second_may_be_anywhere():
+    made = innovations([0.7] * 50)
+    made.add(np.array([0.6, 0.0]), 1.0)
+    for _ in range(15):
+        made.add(np.array([7e-4, 0.0]), FRAME)
+        assert made.trouble == ""
+
+
 def test_the_first_sightings_of_an_episode_do_not_count():
     made = Innovations()
     for _ in range(SKIPPED):
-        made.add(np.array([0.5, 0.0]))
+        made.add(np.array([0.5, 0.0]), FRAME)
     assert made.trouble == ""
     made.restart()
-    made.add(np.array([0.5, 0.0]))
+    made.add(np.array([0.5, 0.0]), FRAME)
     assert made.mean == made.usual
