@@ -19,7 +19,8 @@ from marl_airhockey.cli.environment import (
 )
 from marl_airhockey.cli.options import console, settings
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.play.handicap import BOUNDS, PRESETS, USUAL, Handicap
+from marl_airhockey.play.handicap import BOUNDS, Handicap
+from marl_airhockey.play.ladder import RUNGS, USUAL, usual_level
 from marl_airhockey.registry import REAL, make_driver
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.world.keywords import Keywords
@@ -46,7 +47,7 @@ Browser = Annotated[bool, typer.Option(help="Open the page in the browser.")]
 Reaction = Annotated[
     float | None,
     typer.Option(
-        help="Latency of the actions of drivers that are not people, s.",
+        help="Additional latency with which drivers that are not people observe, s.",
         min=BOUNDS["reaction"][0],
         max=BOUNDS["reaction"][1],
     ),
@@ -54,8 +55,8 @@ Reaction = Annotated[
 Noise = Annotated[
     float | None,
     typer.Option(
-        help="Standard deviation of the noise on the actions of these drivers, as a "
-        "fraction of the top speed.",
+        help="Standard deviation of the error with which these drivers observe pucks, "
+        "m.",
         min=BOUNDS["noise"][0],
         max=BOUNDS["noise"][1],
     ),
@@ -77,8 +78,8 @@ def play(
     opponent: Annotated[
         str | None,
         typer.Option(
-            help="Driver of all other seats; by default a fitting policy of the zoo, "
-            "else allround."
+            help="Level of the ladder or driver of all other seats; by default "
+            f"{USUAL!r}."
         ),
     ] = None,
     reaction: Reaction = None,
@@ -104,8 +105,8 @@ def play(
 ) -> None:
     """Play in the browser against a policy, a script or other people.
 
-    --driver AGENT=person gives a seat to a person. In games against people, drivers are
-    limited to human latency and speed, unless --reaction, --noise or --pace is given.
+    --driver AGENT=person gives a seat to a person. --reaction, --noise and --pace limit
+    all drivers that are not people, instead of the limits of their level.
     """
     require("starlette", "play")
     require("uvicorn", "play")
@@ -122,8 +123,6 @@ def play(
     with environment.table(keywords) as table:
         match = kind(scenario, {}, table, Handicap(**given))
         seat_drivers(match, opponent, seats)
-        if not given and kind is LiveMatch and match.has_opponents:
-            match.set_handicap(PRESETS[USUAL])
         with waiting("preparing the table (the first time takes longer)"):
             match.warm_up()
         if record:
@@ -135,7 +134,8 @@ def _as_trained(scenario: str, names: set[str | None], given: Keywords) -> Keywo
     """Complete the keywords with those in which the policies were trained."""
     from marl_airhockey.play.match_drivers import PERSON
 
-    chosen = sorted(str(name) for name in names if name not in (None, PERSON))
+    levels = [name for name, _, _ in RUNGS]
+    chosen = sorted(str(n) for n in names if n not in (None, PERSON, *levels))
     players = {name: make_driver(name) for name in chosen}
     _, keywords, _ = as_trained_unless_given(players, scenario, given)
     keywords.pop("drivers", None)  # `seat_drivers` sets the driver of every seat.
@@ -216,17 +216,24 @@ def seat_drivers(match: LiveMatch, opponent: str | None, seats: dict[str, Any]) 
 
     Args:
         match: Match that has not started.
-        opponent: Driver of all other seats that are not in ``seats``; None for a
-            fitting policy of the zoo, or else allround.
-        seats: Chosen drivers, by agent.
+        opponent: Level or driver of all other seats that are not in ``seats``; None for
+            the default level.
+        seats: Chosen levels and drivers, by agent.
     """
     from marl_airhockey.play.match_drivers import PERSON
 
-    rest = opponent or next(iter(match.drivers.fitting_policies), "allround")
+    levels = {level.name: level for level in match.drivers.ladder}
+    rest = opponent or usual_level(match.drivers.ladder).name
     chosen = {str(agent): str(name) for agent, name in seats.items()}
     for i in range(len(match.seats)):
         agent = f"paddle_{i}"
-        match.set_driver(i, chosen.pop(agent, PERSON if i == 0 else rest))
+        name = chosen.pop(agent, PERSON if i == 0 else rest)
+        if name not in levels:
+            match.set_driver(i, name)
+        elif match.handicap == Handicap():
+            match.set_level(i, levels[name])
+        else:
+            match.set_driver(i, levels[name].driver)
     if chosen:
         scenario = match.world.scenario.name
         raise ValueError(f"--driver: {scenario} has no agent {', '.join(chosen)}")

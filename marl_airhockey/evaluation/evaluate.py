@@ -257,7 +257,7 @@ def _act_ms(world: World) -> float:
     single = replace(
         view,
         state=state,
-        read=lambda: one,
+        read=lambda _: one,
         top_speed=view.top_speed[:1],
         rng=view.rng.select(np.array([0])),
         scenario_memory={k: v[:1] for k, v in view.scenario_memory.items()},

@@ -127,16 +127,16 @@ def _game(path: Path) -> Game:
 def _players(head: Mapping[str, Any]) -> Iterable[Player]:
     """Yield the players in the metadata of a recording.
 
-    In a study a driver has the label of the plan. Otherwise its name includes the
+    In a study a driver has the label of the plan. Otherwise its name includes its
     handicap.
     """
     label = _table(head, "study").get("opponent")
-    handicap = Handicap(**_table(head, "handicap")).caption
     rows = head.get("players")
     if not isinstance(rows, Sequence) or not all(isinstance(r, Mapping) for r in rows):
         raise ValueError("its meta.json has no list of players")
     for row in rows:
         person, driver = row.get("person"), str(row.get("driver"))
+        handicap = Handicap(**_table(row, "handicap")).caption
         shown = f"{driver} ({handicap})" if handicap else driver
         yield Player(str(person or label or shown), person is not None)
 

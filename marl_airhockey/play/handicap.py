@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import exp
 from types import TracebackType
 from typing import Self
 
@@ -12,10 +13,16 @@ import numpy as np
 from marl_airhockey.sim.contracts.driver import Driver, View
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.seat import Seat
+from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array
 
-BOUNDS = {"reaction": (0.0, 0.3), "noise": (0.0, 1.0), "pace": (0.05, 1.0)}
+BOUNDS = {"reaction": (0.0, 0.5), "noise": (0.0, 0.2), "pace": (0.05, 1.0)}
 """Smallest and largest value of each field of `Handicap`."""
+UNITS = {"reaction": " s", "noise": " m", "pace": ""}
+CORRELATION = 0.25
+"""Correlation time of the error of an observed puck, s: longer than a jitter."""
+OWN_PACE = 0.05
+"""Time between two decisions of a driver without a `control_dt`, s."""
 
 
 @dataclass(frozen=True)
@@ -27,24 +34,25 @@ class Handicap:
     """
 
     reaction: float = 0.0
-    """Latency of each action, s; rounded to a multiple of the driver's control_dt."""
+    """Additional latency with which pucks and other paddles are observed, s; rounded to
+    a multiple of the driver's control_dt."""
     noise: float = 0.0
-    """Standard deviation of normal noise on each component of the action, as a
-    fraction of the top speed."""
+    """Standard deviation of the error of each coordinate of an observed puck, m."""
     pace: float = 1.0
     """Largest norm of the action, as a fraction of the top speed."""
 
     def __post_init__(self) -> None:
         for name, (low, high) in BOUNDS.items():
-            value, unit = getattr(self, name), " s" if name == "reaction" else ""
+            value, unit = getattr(self, name), UNITS[name]
             if not low <= value <= high:
                 raise ValueError(
                     f"{name}: {value:g}{unit} must be in {low:g} .. {high:g}{unit}"
                 )
 
-    def apply(self, driver: Driver) -> Driver:
-        """Return `driver` with these limits."""
-        return HandicappedDriver(driver, self)
+    @property
+    def observes(self) -> bool:
+        """True if the observation of the driver is limited."""
+        return self.reaction > 0.0 or self.noise > 0.0
 
     @property
     def caption(self) -> str:
@@ -54,23 +62,21 @@ class Handicap:
         return ", ".join(f"{k} {v:g}" for k, v in changed.items())
 
 
-PRESETS = {
-    "full strength": Handicap(),
-    # In addition, the games have an observation latency of 0.15 s.
-    "human speed": Handicap(reaction=0.05, noise=0.05, pace=0.7),
-    "gentle": Handicap(reaction=0.1, noise=0.1, pace=0.4),
-}
-"""Handicaps that a page offers, starting with the one without limits."""
-USUAL = "human speed"
-"""Default handicap of drivers that play against people."""
-
-
 @dataclass
 class HandicappedDriver(Driver):
-    """Driver that applies a handicap to the actions of another driver.
+    """Driver that observes late and with errors, and moves slowly.
 
-    It has the control_dt of the other driver. If the other driver has none, it has the
-    control_dt of its training, or else 0.05 s.
+    Its own paddle is observed without additional latency. It has the control_dt of the
+    other driver. If the other driver has none, it has the control_dt of its training,
+    or else `OWN_PACE`.
+
+    Args:
+        inner: Other driver.
+        handicap: Limits of observations and speed.
+
+    Raises:
+        ValueError: The other driver observes histories or images, and the handicap
+            limits observations.
     """
 
     inner: Driver
@@ -79,29 +85,63 @@ class HandicappedDriver(Driver):
     def __post_init__(self) -> None:
         self.observe = self.inner.observe
         trained = self.inner.trained_in.get("control_dt")
-        self.control_dt = self.inner.control_dt or trained or 0.05
+        self.control_dt = self.inner.control_dt or trained or OWN_PACE
+        if self.handicap.observes and self.observe in ("history", "pixels"):
+            raise ValueError(
+                f"reaction and noise must be 0 for a driver with observe={self.observe}"
+            )
         self._delay = round(self.handicap.reaction / self.control_dt)
 
     def check(self, observation: Array | Mapping[str, Array]) -> None:
         self.inner.check(observation)
 
     def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
-        memory = self.inner.reset(seat, rng, worlds)
-        return {**memory, "delayed_actions": np.zeros((worlds, self._delay, 2))}
+        return {
+            **self.inner.reset(seat, rng, worlds),
+            "handicap.begun": np.zeros(worlds, np.bool_),
+        }
 
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        waiting = memory["delayed_actions"]
-        rest = {k: rows for k, rows in memory.items() if k != "delayed_actions"}
-        newest, rest = self.inner.act(view, rest)
-        queue = np.concatenate([waiting, newest[:, None]], axis=1)
-        action = queue[:, 0]
-        if self.handicap.noise:
-            action = action + self.handicap.noise * view.rng.normal(2)
+        own = {k: rows for k, rows in memory.items() if k.startswith("handicap.")}
+        rest = {k: rows for k, rows in memory.items() if k not in own}
+        if self.handicap.observes:
+            seen, own = self.perceive(view, own)
+            read = view.read
+            view = replace(view, state=seen, read=lambda _: read(seen))
+        action, rest = self.inner.act(view, rest)
         norm = np.maximum(np.hypot(action[:, 0], action[:, 1]), 1e-9)
         action = action * np.minimum(self.handicap.pace / norm, 1.0)[:, None]
-        return action, {**rest, "delayed_actions": queue[:, 1:]}
+        return action, {**rest, **own}
+
+    def perceive(
+        self, view: View, memory: dict[str, Array]
+    ) -> tuple[State, dict[str, Array]]:
+        """Return the state that the driver observes (W, ...), and the new memory."""
+        state, first = view.state, ~memory["handicap.begun"]
+        now = np.concatenate([state.position, state.velocity], axis=-1)
+        pucks = state.bodies.puck
+        past = memory.get("handicap.past")
+        if past is None:
+            past = np.repeat(now[:, None], self._delay, axis=1)
+            error = np.zeros((*first.shape, state.bodies.pucks, 2))
+        else:
+            error = memory["handicap.error"]
+        past = np.where(first[:, None, None, None], now[:, None], past)
+        past = np.concatenate([past, now[:, None]], axis=1)
+        late = past[:, 0].copy()
+        late[:, view.seat] = now[:, view.seat]
+        kept = np.where(first, 0.0, exp(-view.control_dt / CORRELATION))[:, None, None]
+        fresh = self.handicap.noise * view.rng.normal(state.bodies.pucks, 2)
+        error = kept * error + np.sqrt(1.0 - kept**2) * fresh
+        late[:, pucks, :2] += error
+        seen = replace(state, position=late[..., :2], velocity=late[..., 2:])
+        return seen, {
+            "handicap.begun": np.ones_like(first),
+            "handicap.past": past[:, 1:],
+            "handicap.error": error,
+        }
 
     def __enter__(self) -> Self:
         self.inner.__enter__()

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from marl_airhockey.play.client import Client
+from marl_airhockey.play.live_match import LiveMatch
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.seats import Seats
 
@@ -26,7 +27,14 @@ class Host(ABC):
     """
 
     def __init__(self, seats: Seats) -> None:
-        self.seats, self.match = seats, seats.match
+        self.seats = seats
+        self.edition = 0
+        """Number of changes of the JSON that `describe` returns."""
+
+    @property
+    def match(self) -> LiveMatch:
+        """Match of the session now."""
+        return self.seats.match
 
     @property
     @abstractmethod
@@ -40,7 +48,7 @@ class Host(ABC):
 
     @abstractmethod
     def describe(self) -> dict[str, Any]:
-        """Return the JSON that a page receives once: the match and all choices."""
+        """Return the JSON that a page receives once for each value of `edition`."""
 
     def status(self) -> dict[str, Any]:
         """Return the additional JSON that all pages receive at every tick."""

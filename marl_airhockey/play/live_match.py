@@ -9,7 +9,8 @@ import numpy as np
 
 from marl_airhockey.build import build_world
 from marl_airhockey.play.handicap import Handicap
-from marl_airhockey.play.match_drivers import PERSON, MatchDrivers
+from marl_airhockey.play.ladder import Level, usual_level
+from marl_airhockey.play.match_drivers import MatchDrivers
 from marl_airhockey.play.messages import description, drawn, events
 from marl_airhockey.rollouts.columns import first_columns
 from marl_airhockey.sim.contracts.observable import OBSERVE
@@ -36,7 +37,8 @@ class LiveMatch:
         drivers: `PERSON`, or name or path of a driver, by agent; a person for all other
             agents.
         keywords: Keywords of the environment, without drivers.
-        handicap: Limits of all drivers that are not people; None for no limits.
+        handicap: Limits of drivers that are set without other limits; None for no
+            limits.
         seed: Seed of the first episode.
 
     Raises:
@@ -65,7 +67,9 @@ class LiveMatch:
                     f"unknown agent {agent!r}; {scenario} has {', '.join(agents)}"
                 )
         profile = self.keywords.get("profile", "ideal")
-        self.drivers = MatchDrivers(self.world, profile, handicap or Handicap())
+        self.drivers = MatchDrivers(self.world, profile)
+        self.handicap = handicap or Handicap()
+        """Limits of drivers that are set without other limits."""
         self.phase: Phase = "lobby"
         self.number = 0
         """Number of episodes."""
@@ -96,14 +100,6 @@ class LiveMatch:
         return self.world.scene.seats
 
     @property
-    def has_opponents(self) -> bool:
-        """True if people play against other drivers."""
-        rows = list(zip(self.seats, self.drivers.names, strict=True))
-        people = {seat.team for seat, name in rows if name == PERSON}
-        others = {seat.team for seat, name in rows if name != PERSON}
-        return bool(people and others - people)
-
-    @property
     def _decided_by(self) -> str:
         memory = {name: value[0] for name, value in self.world.memory.items()}
         return self.world.scenario.decided_by(memory)
@@ -113,8 +109,13 @@ class LiveMatch:
         """Indices of the seats that are successful."""
         return np.flatnonzero(self.world.episode.success[0]).tolist()
 
-    def set_driver(self, i: int, name: str) -> None:
+    def set_driver(self, i: int, name: str, handicap: Handicap | None = None) -> None:
         """Set the driver of a seat, between matches.
+
+        Args:
+            i: Index of the seat.
+            name: Name or path of the driver, or `PERSON`.
+            handicap: Limits of the driver; None for those of the match.
 
         Raises:
             ValueError: A match is running, the name is unknown, or the policy does not
@@ -122,19 +123,28 @@ class LiveMatch:
         """
         if self.phase not in ("lobby", "done"):
             raise ValueError("drivers can only change between matches")
-        self.drivers.set(i, name)
+        self.drivers.set(i, name, self.handicap if handicap is None else handicap)
         if self.phase == "done":
             self.clear()
         else:
             self.drivers.reset([i])
 
+    def set_level(self, i: int, level: Level) -> None:
+        """Set a level of the ladder as the driver of a seat, between matches.
+
+        Raises:
+            ValueError: A match is running, or the driver does not fit.
+        """
+        self.set_driver(i, level.driver, level.handicap)
+
     def substitute(self, i: int) -> None:
-        """Set a fitting policy or script as the driver of a seat, even in a match.
+        """Set the default level of the ladder as a driver, even in a match.
 
         Raises:
             ValueError: The driver does not fit.
         """
-        self.drivers.set(i, next(iter(self.drivers.fitting_policies), "allround"))
+        level = usual_level(self.drivers.ladder)
+        self.drivers.set(i, level.driver, level.handicap)
         self.drivers.reset([i])
 
     def clear(self) -> None:
@@ -144,19 +154,6 @@ class LiveMatch:
             self._use(self._rules)
             self._next_episode()
             self.phase, self.reason = "lobby", ""
-
-    def set_handicap(self, handicap: Handicap) -> None:
-        """Limit all drivers that are not people, from the next match on.
-
-        Raises:
-            ValueError: A match is running.
-        """
-        if self.phase not in ("lobby", "done"):
-            raise ValueError("opponents can only change between matches")
-        self.drivers.handicap = handicap
-        for i, name in enumerate(self.drivers.names):
-            if name != PERSON:
-                self.set_driver(i, name)
 
     def to_ego(self, i: int, x: float, y: float) -> tuple[float, float]:
         """Rotate a vector from the table frame into the ego frame of a seat."""

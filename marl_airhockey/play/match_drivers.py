@@ -9,17 +9,16 @@ from functools import cached_property
 import numpy as np
 
 from marl_airhockey.build import refuse_erratic
-from marl_airhockey.play.handicap import Handicap
+from marl_airhockey.play.handicap import Handicap, HandicappedDriver
+from marl_airhockey.play.ladder import Level, ladder_of
 from marl_airhockey.policies.load import ZOO, policy_file
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.registry import (
-    independent_driver_names,
     make_driver,
     make_scenario,
     zoo_names,
 )
 from marl_airhockey.sim.contracts.driver import Driver
-from marl_airhockey.sim.contracts.scenario import GoalScenario
 from marl_airhockey.sim.world.driven_seat import DrivenSeat
 from marl_airhockey.sim.world.world import World
 from marl_airhockey.toolkit.pointing import ARM_LAG
@@ -35,12 +34,13 @@ class MatchDrivers:
     Args:
         world: Batch with a single world.
         profile: Profile of the world, by which fitting policies are sorted.
-        handicap: Limits of all drivers that are not people.
     """
 
-    def __init__(self, world: World, profile: str, handicap: Handicap) -> None:
-        self._world, self._profile, self.handicap = world, profile, handicap
+    def __init__(self, world: World, profile: str) -> None:
+        self._world, self._profile = world, profile
         seats = world.scene.seats
+        self.handicaps = [Handicap() for _ in seats]
+        """Handicap of the driver of each seat; none for people."""
         self.names = [PERSON for _ in seats]
         """Name or path of the driver of each seat."""
         self._device_kinds = ["mouse" for _ in seats]
@@ -49,24 +49,23 @@ class MatchDrivers:
         self._devices = [make_driver(self._by_kind["mouse"]) for _ in seats]
         self._driven = [self._build(i) for i in range(len(seats))]
 
-    @property
-    def choices(self) -> list[str]:
-        """Names of drivers that players can choose: fitting policies, then scripts."""
-        known = {name: make_driver(name) for name in independent_driver_names()}
-        goal = isinstance(self._world.scenario, GoalScenario)
+    @cached_property
+    def ladder(self) -> list[Level]:
+        """Levels of opponents that players can choose.
+
+        On a real table, no driver observes with additional latency or errors.
+        """
+        teams = {seat.team for seat in self._world.scene.seats}
+        name = self._world.scenario.name
+        levels = ladder_of(name, self.fitting_policies, len(teams) > 1)
         real = self._world.live is not None
-        scripts = [
-            name
-            for name, driver in known.items()
-            if (goal or not driver.needs_goal) and not (real and driver.erratic)
-        ]
-        if len(self.names) > 1:
-            scripts += [
-                f"{name}:strength={strength}"
-                for name in ("allround", "striker", "goalkeeper")
-                for strength in ("weak", "fair")
-            ]
-        return [*self.fitting_policies, *scripts]
+        return [level for level in levels if not (real and level.handicap.observes)]
+
+    def level(self, i: int) -> str:
+        """Return the name of the level of a seat; "" for a driver of no level."""
+        now = self.names[i], self.handicaps[i]
+        names = [x.name for x in self.ladder if (x.driver, x.handicap) == now]
+        return next(iter(names), "")
 
     @property
     def digests(self) -> list[str]:
@@ -105,20 +104,23 @@ class MatchDrivers:
             seat.driver.__exit__(None, None, None)
         self._driven = [self._build(i) for i in range(len(self.names))]
 
-    def set(self, i: int, name: str) -> None:
+    def set(self, i: int, name: str, handicap: Handicap) -> None:
         """Set the driver of a seat; the old driver remains if the new one does not fit.
+
+        A person and a driver that owns a device have no handicap.
 
         Raises:
             ValueError: The name is unknown, or the policy does not fit.
         """
-        old_name, old = self.names[i], self._driven[i]
-        self.names[i] = name
+        old_name, old_handicap, old = self.names[i], self.handicaps[i], self._driven[i]
+        self.names[i], self.handicaps[i] = name, handicap
         try:
             self._driven[i] = self._build(i)
             self.reset([i])
             self.action(i)  # A policy that does not fit fails here, not in a match.
         except ValueError:
-            self.names[i], self._driven[i] = old_name, old
+            self.names[i], self.handicaps[i] = old_name, old_handicap
+            self._driven[i] = old
             raise
         old.driver.__exit__(None, None, None)
 
@@ -184,6 +186,8 @@ class MatchDrivers:
                 )
             live = world.live is not None
             refuse_erratic(f"paddle_{i}", driver, live)
-            if not (driver.needs_person or driver.needs_device):
-                driver = self.handicap.apply(driver)
+        if name == PERSON or driver.needs_person or driver.needs_device:
+            self.handicaps[i] = Handicap()
+        else:
+            driver = HandicappedDriver(driver, self.handicaps[i])
         return DrivenSeat(i, driver, world.observer, 1, world.control_dt)

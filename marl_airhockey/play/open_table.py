@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from marl_airhockey.play.client import Client
-from marl_airhockey.play.handicap import PRESETS
 from marl_airhockey.play.host import GONE, GRACE, Handler, Host
 from marl_airhockey.play.live_match import LiveMatch
 from marl_airhockey.play.match_drivers import PERSON
@@ -18,6 +17,7 @@ from marl_airhockey.play.real_match import RealMatch
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.seats import Seats
 from marl_airhockey.play.session import Session
+from marl_airhockey.play.visitors import Visitors
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,7 @@ class OpenTable(Host):
     def __init__(self, seats: Seats, recorder: Recorder | None, plant: Plant) -> None:
         super().__init__(seats)
         self._recorder, self.plant = recorder, plant
-        self._left: dict[int, tuple[str, float]] = {}
-        """Key of the last page of a free seat, and the time until which the seat is
-        reserved for it, s, by seat."""
+        self.visitors = Visitors(seats)
         self._handlers: dict[str, Handler] = {
             "hello": self._hello,
             "aim": seats.aim,
@@ -71,7 +69,7 @@ class OpenTable(Host):
             "sit": self._sit,
             "leave": self._leave,
             "opponent": self._opponent,
-            "handicap": self._handicap,
+            "join": self._join,
             "fault": self._fault,
         }
 
@@ -86,52 +84,63 @@ class OpenTable(Host):
     def describe(self) -> dict[str, Any]:
         return {
             **self.match.describe(),
-            "choices": self.match.drivers.choices,
-            "handicaps": list(PRESETS),
+            "ladder": [level.name for level in self.match.drivers.ladder],
             "camera": isinstance(self.match, RealMatch),
             "faults": dict(self.plant.faults),
         }
 
+    def own_fields(self, client: Client) -> dict[str, Any]:
+        return {"queue": self.visitors.position(client)}
+
     def disconnected(self, client: Client) -> None:
         """Free the seat of a page that disconnected, and reserve it for `GRACE`."""
+        self.visitors.leave_queue(client)
         if client.seat is not None:
             self._free(client, GONE, time.monotonic() + GRACE)
 
     def check_presence(self, now: float) -> None:
-        """Free the seats of idle pages; clear a table that all people have left."""
+        """Free the seats of idle pages, seat those that wait, clear an empty table."""
         for client in self.seats.clients:
             if self.seats.is_idle(client, now):
                 self._free(client, "a player has been idle", now)
+        self._seat_waiting(now)
         people = self.match.drivers.names.count(PERSON)
-        reserved = any(until > now for _, until in self._left.values())
+        reserved = self.visitors.any_reserved(now)
         if people and len(self.seats.free) == people and not reserved:
-            self._left.clear()
+            self.visitors.forget()
             if self.match.phase != "lobby":
                 self.clear_table("everybody has left")
 
     def _free(self, client: Client, reason: str, until: float) -> None:
         """Free the seat of a page, which can return to it until a time, s."""
         assert client.seat is not None
-        self._left[client.seat] = client.key, until
+        self.visitors.reserve(client.seat, client, until)
         self.seats.leave(client, reason)
 
     def _take(self, client: Client, seat: int) -> None:
         """Assign a seat to a page; a new person does not continue a running match."""
-        last, _ = self._left.pop(seat, ("", 0.0))
-        if last != client.key and self.match.phase != "lobby":
+        returns = self.visitors.returns(seat, client)
+        self.visitors.forget(seat)
+        self.visitors.leave_queue(client)
+        if not returns and self.match.phase != "lobby":
             self.clear_table("the players changed")
         self.seats.take(client, seat)
+        if self.match.reason == GONE and not self.seats.free:
+            self.match.start()
+
+    def _seat_waiting(self, now: float) -> None:
+        """Give free seats to the pages that wait, at a time, s."""
+        while found := self.visitors.next(now):
+            self._take(*found)
 
     def _hello(self, client: Client, key: str) -> None:
-        seats, now = self.seats, time.monotonic()
         client.key, client.name = key, hashlib.sha256(key.encode()).hexdigest()[:8]
-        nobody = "", 0.0
-        own = [i for i in seats.free if self._left.get(i, nobody)[0] == key]
-        open_ones = [i for i in seats.free if self._left.get(i, nobody)[1] <= now]
-        if client.seat is None and (own or open_ones):
-            self._take(client, [*own, *open_ones][0])
-            if self.match.reason == GONE and not seats.free:
-                self.match.start()
+        self._join(client)
+
+    def _join(self, client: Client) -> None:
+        """Give a page a seat, or let it wait for one."""
+        self.visitors.wait(client)
+        self._seat_waiting(time.monotonic())
 
     def _start(self, client: Client) -> None:
         if self.seats.may_control(client) and not self.seats.free:
@@ -151,7 +160,7 @@ class OpenTable(Host):
             return
         for seat in self.seats.free:
             self.match.substitute(seat)
-        self._left.clear()
+        self.visitors.forget()
         self.match.start()
 
     def _golden_goal(self, client: Client) -> None:
@@ -166,13 +175,14 @@ class OpenTable(Host):
         """Move all players to the next seat; in a duel they change ends."""
         if not self.seats.may_control(client) or not self._between_matches:
             return
-        names = list(self.match.drivers.names)
-        for i, name in enumerate(names):
-            self.match.set_driver((i + 1) % len(names), name)
+        drivers = self.match.drivers
+        names, handicaps = list(drivers.names), list(drivers.handicaps)
+        for i, (name, handicap) in enumerate(zip(names, handicaps, strict=True)):
+            self.match.set_driver((i + 1) % len(names), name, handicap)
         for other in self.seats.clients:
             if other.seat is not None:
                 other.seat = (other.seat + 1) % len(names)
-        self._left.clear()
+        self.visitors.forget()
 
     def _sit(self, client: Client, seat: int) -> None:
         if seat in self.seats.free:
@@ -185,21 +195,19 @@ class OpenTable(Host):
             self._free(client, "a player has left", 0.0)
 
     def _opponent(self, client: Client, seat: int, name: str) -> None:
+        """Set a person or a level of the ladder as the driver of a seat."""
         drivers, taken = self.match.drivers, [c.seat for c in self.seats.clients]
-        if not self.seats.may_control(client):
+        if not self.seats.may_control(client) or not self._between_matches:
             return
         if seat >= len(drivers.names) or seat in taken:
             return
-        if name in [*drivers.choices, PERSON] and self._between_matches:
-            # Offered drivers fit; the match rejects other drivers.
-            with contextlib.suppress(ValueError):
-                self.match.set_driver(seat, name)
-
-    def _handicap(self, client: Client, name: str) -> None:
-        allowed = self.seats.may_control(client) and self._between_matches
-        if allowed and name in PRESETS:
-            with contextlib.suppress(ValueError):
-                self.match.set_handicap(PRESETS[name])
+        if name == PERSON:
+            self.match.set_driver(seat, PERSON)
+        for level in drivers.ladder:
+            if level.name == name:
+                # Levels fit; a match on a real table rejects limited observations.
+                with contextlib.suppress(ValueError):
+                    self.match.set_level(seat, level)
 
     def _fault(self, client: Client, name: str, on: int) -> None:
         if self.seats.may_control(client) and name in self.plant.faults:

@@ -43,7 +43,7 @@ MESSAGES: dict[str, dict[str, type]] = {
     "sit": {"seat": int},
     "leave": {},
     "opponent": {"seat": int, "name": str},
-    "handicap": {"name": str},
+    "join": {},
     "fault": {"name": str, "on": int},
     "consent": {"version": str},
     "answer": {"question": str, "value": int},

@@ -59,7 +59,7 @@ class RealMatch(LiveMatch):
         scenario: Name of the scenario.
         drivers: Drivers by agent, see `LiveMatch`.
         keywords: Keywords of the environment, with the rig.
-        handicap: Limits without noise, see `LiveMatch`.
+        handicap: Limits of the speed, see `LiveMatch`.
         seed: Seed of the first episode.
     """
 
@@ -101,10 +101,10 @@ class RealMatch(LiveMatch):
         self.world.draw_worlds(np.zeros(1, np.int64))
         self._begin_episode()
 
-    def set_handicap(self, handicap: Handicap) -> None:
-        if handicap.noise:
-            raise ValueError("noise: noise is not allowed on a real arm; give 0")
-        super().set_handicap(handicap)
+    def set_driver(self, i: int, name: str, handicap: Handicap | None = None) -> None:
+        if (handicap or self.handicap).observes:
+            raise ValueError("reaction and noise must be 0 on a real table")
+        super().set_driver(i, name, handicap)
 
     def warm_up(self) -> None:
         """Do nothing: everything is compiled before an episode starts."""

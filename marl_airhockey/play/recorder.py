@@ -91,7 +91,6 @@ class Recorder:
             "players": players,
             "policies": match.drivers.digests,
             "devices": devices,
-            "handicap": vars(match.drivers.handicap),
             "study": self.notes,
         }
         with self._giving_up():

@@ -40,17 +40,16 @@ class Seats:
 
     @property
     def players(self) -> list[dict[str, Any]]:
-        """Driver, and pseudonym and consent of the person, of each seat.
+        """Driver and its handicap, and pseudonym and consent of the person, by seat.
 
         Pseudonym and consent are None for other drivers.
         """
         people = {c.seat: (c.name, c.consent) for c in self.clients}
-        rows = []
-        for i, driver in enumerate(self.match.drivers.names):
+        drivers, rows = self.match.drivers, []
+        for i, driver in enumerate(drivers.names):
             person, consent = people.get(i, (None, None))
-            rows.append(
-                {"seat": i, "driver": driver, "person": person, "consent": consent}
-            )
+            row = {"seat": i, "driver": driver, "handicap": vars(drivers.handicaps[i])}
+            rows.append({**row, "person": person, "consent": consent})
         return rows
 
     @property

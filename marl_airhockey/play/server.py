@@ -27,6 +27,7 @@ STALLED = 10.0
 """Time after which a page that does not receive a frame is disconnected, s."""
 MAX_CLIENTS = 200
 """Largest number of connected pages."""
+FULL = f"The table is full: {MAX_CLIENTS} pages are connected"
 
 
 def _page(access: AccessCheck, mode: str, *routes: BaseRoute) -> list[BaseRoute]:
@@ -76,7 +77,9 @@ def application(session: Session, access: AccessCheck) -> Starlette:
             await socket.close(1008, bytes(refusal.body).decode().strip())
             return
         if len(session.clients) >= MAX_CLIENTS:
-            await socket.close(1013, "too many pages are connected")
+            # Only an accepted connection can carry a reason.
+            await socket.accept()
+            await socket.close(1013, f"{FULL}.")
             return
         await socket.accept()
         client = session.connect(remote=access.is_remote(socket))
@@ -141,8 +144,11 @@ def _note_failure(session: Session, task: asyncio.Task[None]) -> None:
 async def _write(socket: WebSocket, session: Session, client: Client) -> None:
     """Send the newest frame to a page whenever the last one has been sent."""
     try:
-        await socket.send_json({"t": "match", **session.describe()})
+        edition = -1
         while True:
+            if edition != session.host.edition:
+                edition = session.host.edition
+                await socket.send_json({"t": "match", **session.describe()})
             await client.frame_ready.wait()
             client.frame_ready.clear()
             number, now = client.frame_number, time.monotonic()

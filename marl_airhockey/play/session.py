@@ -8,9 +8,8 @@ import time
 from typing import Any
 
 from marl_airhockey.play.client import Client
-from marl_airhockey.play.handicap import PRESETS
 from marl_airhockey.play.host import Host
-from marl_airhockey.play.live_match import RATE
+from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.protocol import parse
 from marl_airhockey.play.real_match import RealMatch
 from marl_airhockey.play.recorder import Recorder
@@ -30,7 +29,7 @@ class Session:
     """
 
     def __init__(self, host: Host) -> None:
-        self.host, self.match, self._seats = host, host.match, host.seats
+        self.host, self._seats = host, host.seats
         self.rate = float(RATE)
         """Number of ticks in the last second, 1/s."""
         self._recorded: list[dict[str, Any]] = []
@@ -38,6 +37,11 @@ class Session:
         self._frames = 0
         self.failure: BaseException | None = None
         """Exception that ended the loop, if any."""
+
+    @property
+    def match(self) -> LiveMatch:
+        """Match of the session now."""
+        return self.host.match
 
     @property
     def clients(self) -> set[Client]:
@@ -81,7 +85,7 @@ class Session:
             handlers[kind](client, **fields)
 
     def describe(self) -> dict[str, Any]:
-        """Return the JSON that a page receives once."""
+        """Return the JSON that a page receives once per edition of the host."""
         return self.host.describe()
 
     async def run(self) -> None:
@@ -153,16 +157,18 @@ class Session:
             client.frame_ready.set()
 
     def _status(self) -> dict[str, Any]:
-        """Return the data about players, handicap and server for all pages."""
+        """Return the data about players and server for all pages."""
         drivers, recorder = self.match.drivers, self.host.recorder
-        presets = {preset: name for name, preset in PRESETS.items()}
         film = [recorder.trouble] if recorder is not None else []
         return {
             "seats": [
-                {"driver": p["driver"], "taken": p["person"] is not None}
-                for p in self._seats.players
+                {
+                    "driver": p["driver"],
+                    "level": drivers.level(i),
+                    "taken": p["person"] is not None,
+                }
+                for i, p in enumerate(self._seats.players)
             ],
-            "handicap": presets.get(drivers.handicap, drivers.handicap.caption),
             "troubles": [*drivers.troubles, *film],
             "watching": sum(client.seat is None for client in self.clients),
             "rate": round(self.rate, 1),

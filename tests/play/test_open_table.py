@@ -61,6 +61,28 @@ def test_whoever_remains_goes_on_against_a_driver_or_ends_the_match(table):
     assert table.match.phase == "done"
 
 
+def test_a_waiting_page_is_seated_when_the_reservation_ends(table):
+    one, other = enter(table, "1"), enter(table, "2")
+    third, fourth = enter(table, "3"), enter(table, "4")
+    queue = [table.host.own_fields(page)["queue"] for page in (one, third, fourth)]
+    assert queue == [0, 1, 2]
+    begin(table, one)
+    now = time.monotonic()
+    table.disconnect(other)
+    table.host.check_presence(now)
+    assert third.seat is None, "the seat is reserved for a reload"
+    table.host.check_presence(now + GRACE + 1.0)
+    assert (third.seat, fourth.seat) == (1, None)
+    assert table.match.phase == "lobby"
+    table.receive(one, line("leave"))
+    assert one.seat is None
+    table.host.check_presence(now + GRACE + 2.0)
+    assert fourth.seat == 0
+    assert table.host.own_fields(one)["queue"] == 0, "it left on purpose"
+    table.receive(one, line("join"))
+    assert table.host.own_fields(one)["queue"] == 1
+
+
 def test_a_match_can_be_ended_while_somebody_is_missing(table):
     one, other = enter(table, "1"), enter(table, "2")
     begin(table, one)
@@ -129,7 +151,7 @@ def test_a_level_game_names_the_shots_that_decide_it_and_offers_a_golden_goal():
     state = json.loads(client.frame)
     assert (state["golden_goal"], state["decided_by"]) == (True, "goals")
     assert not state["offers_golden_goal"]
-    session.receive(client, line("opponent", seat=1, name="still"))
+    session.receive(client, line("opponent", seat=1, name="gentle"))
     assert match.phase == "lobby"
     assert not match.state()["golden_goal"], "the next match has the usual rules"
     assert match.keywords["options"] == {"seconds": 1.0}
@@ -145,9 +167,3 @@ def test_lives_or_shots_decide_a_game_of_all():
     assert judge(memory) == "shots on goal"
     memory["lives"][:] = np.array([0.0, 0.0, 2.0, 1.0])
     assert judge(memory) == "lives"
-
-
-def test_opponents_are_drivers_of_another_team():
-    assert LiveMatch("duel", {"paddle_1": "still"}, {}).has_opponents
-    assert not LiveMatch("duel", {}, {}).has_opponents
-    assert not LiveMatch("juggle", {}, {}).has_opponents

@@ -27,7 +27,7 @@ def test_who_remains_is_offered_ways_on(browser):
         assert one.locator("#stop").is_visible()
         one.get_by_role("button", name="Continue against the computer").click()
         wait(one, "s.phase === 'play' && s.seats[1].driver === 'zoo/duel'")
-        assert one.locator(".seat").nth(1).inner_text() == "Computer, trained"
+        assert one.locator(".seat").nth(1).inner_text() == "Champion at human speed"
         one.locator("#leave").click()
         stranger = page_at(browser, address, complaints)
         wait(stranger, "s.seat === 0 && s.phase === 'lobby'")
@@ -132,7 +132,7 @@ def test_the_first_screen_is_in_words_of_players(browser):
     with served("duel") as (address, _):
         page = page_at(browser, address, complaints)
         state = state_of(page)
-        assert state["handicap"] == "human speed"
+        assert state["seats"][1]["level"] == "champion at human speed"
         text = page.locator("body").inner_text()
         for word in ("policy", "loop", "Hz", "handicap", "zoo", "round trip"):
             assert word not in text, word

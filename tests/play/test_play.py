@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 from pages import aim, line
 
-from marl_airhockey.play.handicap import PRESETS, Handicap
+from marl_airhockey.build import build_world
+from marl_airhockey.play.handicap import Handicap, HandicappedDriver
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.open_table import open_table
 from marl_airhockey.play.seats import IDLE
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.world.driven_seat import DrivenSeat
 
 
 @pytest.mark.usefixtures("uncompiled")
@@ -126,20 +129,19 @@ def test_opponents_are_chosen_between_matches_and_ends_change():
     session.receive(client, line("hello", key="k"))
     session.receive(client, line("opponent", seat=1, name="../secret.zip"))
     assert match.drivers.names[1] == "zoo/duel", "only who is offered may play"
-    session.receive(client, line("opponent", seat=1, name="allround:strength=weak"))
-    assert match.drivers.names == ["person", "allround:strength=weak"]
-    session.receive(client, line("handicap", name="gentle"))
-    assert match.drivers.handicap == PRESETS["gentle"]
-    session.receive(client, line("handicap", name="divine"))
-    assert match.drivers.handicap == PRESETS["gentle"], "only what is offered"
+    session.receive(client, line("opponent", seat=1, name="gentle"))
+    gentle = match.drivers.ladder[0]
+    assert match.drivers.names == ["person", gentle.driver]
+    assert match.drivers.handicaps == [Handicap(), gentle.handicap]
     session.receive(client, line("swap"))
-    assert match.drivers.names == ["allround:strength=weak", "person"]
+    assert match.drivers.names == [gentle.driver, "person"]
+    assert match.drivers.handicaps == [gentle.handicap, Handicap()]
     assert client.seat == 1
     session.receive(client, line("start"))
     for _ in range(4 * RATE):
         session.tick()
-    session.receive(client, line("opponent", seat=0, name="still"))
-    assert match.drivers.names[0] == "allround:strength=weak", "not during a match"
+    session.receive(client, line("opponent", seat=0, name="champion"))
+    assert match.drivers.names[0] == gentle.driver, "not during a match"
     with pytest.raises(ValueError, match="unknown driver"):
         LiveMatch("duel", {"paddle_1": "nobody"}, {})
     with pytest.raises(ValueError, match="use person"):
@@ -173,14 +175,13 @@ def test_opponents_are_chosen_between_matches_and_ends_change():
 def test_policies_that_fit_are_offered(game, keywords, fitting):
     match = LiveMatch(game, {}, keywords, seed=0)
     assert match.drivers.fitting_policies == fitting
-    for name in match.drivers.choices:
-        match.set_driver(0, name)
+    for level in match.drivers.ladder:
+        match.set_level(0, level)
+        assert match.drivers.level(0) == level.name
     if not fitting:
         with pytest.raises(ValueError, match="expects observations"):
             match.set_driver(0, f"zoo/{game}")
-        assert match.drivers.names[0] == match.drivers.choices[-1], (
-            "who sat there still does"
-        )
+        assert match.drivers.level(0) == level.name, "who sat there still does"
 
 
 def test_a_match_ends_and_another_begins():
@@ -210,23 +211,57 @@ def test_a_warm_up_leaves_no_trace():
     assert fresh.number == other.number == 1
 
 
-def test_fair_opponents_act_late_and_slowly():
-    def first_move(handicap):
+def test_a_handicap_limits_the_speed():
+    def fastest(handicap):
         seats = {"paddle_0": "striker", "paddle_1": "still"}
         match = LiveMatch("duel", seats, {}, handicap, seed=2)
         match.start()
-        fastest, began = 0.0, None
-        for tick in range(6 * RATE):
+        speeds = []
+        for _ in range(6 * RATE):
             match.tick()
-            speed = float(np.hypot(*match.world.state.paddle_velocity[0, 0]))
-            fastest = max(fastest, speed)
-            if began is None and speed > 0.01:
-                began = tick
-        return began, fastest
+            speeds.append(np.hypot(*match.world.state.paddle_velocity[0, 0]))
+        return max(speeds)
 
-    at_once, fast = first_move(Handicap())
-    late, slow = first_move(Handicap(reaction=0.2, pace=0.3))
-    assert late - at_once == pytest.approx(0.2 * RATE, abs=1)
-    assert slow <= 0.3 * 5.0 + 1e-6 < fast
+    assert fastest(Handicap(pace=0.3)) <= 0.3 * 5.0 + 1e-6 < fastest(Handicap())
     with pytest.raises(ValueError, match="reaction"):
         Handicap(reaction=2.0)
+
+
+class Notes(Driver):
+    """Driver that notes the puck and the own paddle that it observes."""
+
+    observe, control_dt, needs_goal = "velocity", 0.05, False
+
+    def __init__(self):
+        self.seen, self.read = [], []
+
+    def act(self, view, memory):
+        self.seen.append(np.hstack([view.state.puck[0, 0], view.state.paddle[0, 1]]))
+        labels = ("puck_0.x", "puck_0.y", "own.x", "own.y")
+        self.read.append(view.observation[0, [view.labels.index(n) for n in labels]])
+        return np.tile((0.3, 0.1), (len(view.state.puck), 1)), memory
+
+
+def test_a_handicapped_driver_observes_the_puck_late_and_its_own_paddle_now():
+    def notes(handicap):
+        own = Notes()
+        world = build_world("duel", 1, False, {}, ["velocity"])
+        seat = DrivenSeat(
+            1, HandicappedDriver(own, handicap), world.observer, 1, world.control_dt
+        )
+        world.reset(3)
+        seat.reset(np.zeros(1, int), world.seeds, world.episode.number)
+        for _ in range(30):
+            action = np.zeros((1, 2, 2))
+            action[:, 1] = seat.act(world.known)
+            world.step(action)
+        return np.array(own.seen), np.array(own.read)
+
+    plain, late = notes(Handicap()), notes(Handicap(reaction=0.1))
+    for now, then in zip(plain, late, strict=True):
+        np.testing.assert_allclose(then[2:, :2], now[:-2, :2], atol=1e-6)
+        np.testing.assert_allclose(then[:, 2:], now[:, 2:], atol=1e-6)
+    noisy = notes(Handicap(noise=0.02))
+    error = noisy[0][:, :2] - plain[0][:, :2]
+    assert 0.002 < np.abs(error).mean() < 0.06
+    np.testing.assert_allclose(noisy[0], noisy[1], atol=1e-6)

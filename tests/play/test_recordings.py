@@ -9,6 +9,7 @@ from pages import aim, line
 from PIL import Image
 
 from marl_airhockey.data.reader import read_recording
+from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.measures import interceptions
 from marl_airhockey.play.open_table import open_table
@@ -39,6 +40,7 @@ def test_an_episode_is_recorded_step_by_step(tmp_path):
     assert recording.head["players"][0] == {
         "seat": 0,
         "driver": "person",
+        "handicap": vars(Handicap()),
         "person": client.name,
         "consent": None,
     }

@@ -34,6 +34,5 @@ def open_match(plan: Plan) -> LiveMatch:
 
 def seat_opponent(match: LiveMatch, opponent: Opponent) -> None:
     """Set an opponent as the driver of all seats except the participant's."""
-    match.set_handicap(opponent.handicap)
     for i in range(1, len(match.seats)):
-        match.set_driver(i, opponent.name)
+        match.set_driver(i, opponent.name, opponent.handicap)

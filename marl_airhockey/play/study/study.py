@@ -172,8 +172,7 @@ class Study(Host):
         """Return the JSON that a page receives once: the match and the texts."""
         return {
             **self.match.describe(),
-            "choices": [],
-            "handicaps": [],
+            "ladder": [],
             "study": texts(self.plan),
         }
 
@@ -182,7 +181,7 @@ class Study(Host):
         participant = self.people.participant
         course = participant.course if participant else None
         seats = seat_rows(course, len(self.match.seats))
-        status: dict[str, Any] = {"seats": seats, "handicap": ""}
+        status: dict[str, Any] = {"seats": seats}
         if participant and participant.diary.failure:
             status["not_recorded"] = participant.diary.failure
         return status

@@ -105,7 +105,6 @@ addEventListener("click", (event) => { const button = event.target.closest("butt
 $("speed").onchange = () => $("speed").blur();
 $("leave").onclick = () => send("leave");
 $("withdraw").onclick = () => { leaving = true; };
-$("handicap").onchange = () => { send("handicap", { name: $("handicap").value }); $("handicap").blur(); };
 
 // On from the first tap or key: before it, browsers let no page make a sound.
 let audio = null, muted = localStorage.getItem("muted") === "yes";

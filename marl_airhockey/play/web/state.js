@@ -57,7 +57,7 @@ function connect() {
 
 // -- A recording instead of a game --
 
-const OF_PLAYERS = ["swap", "leave", "strength", "stop", "golden"]; // controls of a live open table
+const OF_PLAYERS = ["swap", "leave", "stop", "golden"]; // controls of a live open table
 let recording = null; // { steps, at, runs }
 
 async function begin() {

@@ -36,7 +36,6 @@ function updateWords() {
   $("leave").hidden = !sits;
   canvas.classList.toggle("mine", sits && now.phase === "play");
   seats(free);
-  handicap(mayControl && !runs && now.phase !== "pause");
   notice(sits, free, mayControl);
 }
 
@@ -56,7 +55,7 @@ function notice(sits, free, mayControl) {
   if (down) show("No connection", refused || "trying again…", "");
   else if (now.phase === "arrange") show("Getting ready", now.reason, "");
   else if (now.phase === "countdown") show(String(Math.ceil(now.time_left)), "", "", true);
-  else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player, who has to open this page." : sits ? `${match.what} ${howTo()}` : free >= 0 ? "A seat is free below." : "Waiting for the players.", mayControl ? "Start" : "");
+  else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player, who has to open this page." : sits ? `${match.what} ${howTo()}` : now.queue === 1 ? "You are next." : now.queue ? `${now.queue - 1} before you.` : free >= 0 ? "A seat is free below." : "Waiting for the players.", mayControl ? "Start" : "");
   else if (now.phase === "pause" && alone) show("Paused", `${sentence(now.reason)} You can wait, continue against the computer, or end the match.`, "Continue against the computer", false, "substitute");
   else if (now.phase === "pause" && free >= 0 && !match.study) show("Paused", `${sentence(now.reason)} The player who takes the free seat below starts a new match.`, "");
   else if (now.phase === "pause") show(match.camera ? "Please confirm" : "Paused", now.reason, mayControl ? "Continue" : "");
@@ -112,10 +111,12 @@ function scoreboard() {
 }
 
 function titleOf(i) {
-  const { driver, title } = now.seats[i];
+  const { driver, level, title } = now.seats[i];
   if (title !== undefined) return i === now.seat ? "You" : title;
-  return driver === "person" ? (i === now.seat ? "You" : now.seats[i].taken ? "A person" : "Free seat") : driverTitle(driver);
+  return driver === "person" ? (i === now.seat ? "You" : now.seats[i].taken ? "A person" : "Free seat") : level ? levelTitle(level) : driverTitle(driver);
 }
+
+const levelTitle = (name) => (match.ladder.includes(name) ? `${name[0].toUpperCase()}${name.slice(1)}` : driverTitle(name));
 
 // Names that players read; the details have those of the command line.
 function driverTitle(name) {
@@ -142,9 +143,9 @@ function seats(free) {
     else if (now.seat !== null && can && !match.study) {
       const list = document.createElement("select");
       list.setAttribute("aria-label", `player of seat ${i + 1}`);
-      for (const name of [...new Set(["person", seat.driver, ...match.choices])]) {
-        const option = new Option(name === "person" ? "Another person" : driverTitle(name), name);
-        option.selected = name === seat.driver; list.append(option);
+      for (const name of [...new Set(["person", seat.level || seat.driver, ...match.ladder])]) {
+        const option = new Option(name === "person" ? "Another person" : levelTitle(name), name);
+        option.selected = name === (seat.level || seat.driver); list.append(option);
       }
       list.onchange = () => { send("opponent", { seat: i, name: list.value }); list.blur(); panel = ""; };
       box.append(list);
@@ -153,12 +154,4 @@ function seats(free) {
     } else box.append(titleOf(i));
     $("seats").append(box);
   });
-}
-
-function handicap(canChoose) {
-  const list = $("handicap"), names = [...new Set([...match.handicaps, now.handicap])];
-  $("strength").hidden = match.camera || now.seats.every((s) => s.driver === "person");
-  list.disabled = !canChoose;
-  if (list.options.length !== names.length) { list.textContent = ""; for (const name of names) list.append(new Option(name)); }
-  if (document.activeElement !== list) list.value = now.handicap;
 }

@@ -28,8 +28,9 @@ class View:
     """Seats, bodies and goal lines on the table."""
     state: State
     """Sensed state in the seat's ego frame."""
-    read: Callable[[], Array | Mapping[str, Array]]
-    """Function that computes `observation`, only for drivers that use it."""
+    read: Callable[[State | None], Array | Mapping[str, Array]]
+    """Function that computes the observation of a state like ``state``; of ``state``
+    itself for None."""
     labels: tuple[str, ...]
     """Name of each element of a flat observation."""
     top_speed: Array
@@ -50,7 +51,7 @@ class View:
     @cached_property
     def observation(self) -> Array | Mapping[str, Array]:
         """Observation (B, D) of type `observe`; a dictionary with goals="dict"."""
-        return self.read()
+        return self.read(None)
 
 
 PrescribedMotion = Array

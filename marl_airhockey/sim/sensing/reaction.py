@@ -53,6 +53,23 @@ class ReactionDelay:
         return {name: ring[oldest] for (of, name), ring in past if of == part}
 
 
+def whole_steps(reaction: float, control_dt: float) -> int:
+    """Return a reaction time in control steps.
+
+    Raises:
+        ValueError: It is not a multiple of ``control_dt``.
+    """
+    steps = round(reaction / control_dt)
+    if abs(steps * control_dt - reaction) > 1e-6:
+        near = [k * control_dt for k in (steps, steps + 1)]
+        raise ValueError(
+            f"reaction: {reaction:g} s is not a multiple of control_dt, "
+            f"{control_dt:g} s; set another control_dt or an option, e.g. "
+            f'options={{"reaction": {near[0]:g}}} or {near[1]:g}'
+        )
+    return steps
+
+
 def _arrays(parts: Parts) -> Iterator[tuple[tuple[str, str], Array]]:
     """Yield all arrays of parts with their keys."""
     for part, named in parts.items():

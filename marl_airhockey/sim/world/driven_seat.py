@@ -9,6 +9,7 @@ import numpy as np
 
 from marl_airhockey.sim.contracts.driver import Driver, View
 from marl_airhockey.sim.core.rng import StreamSet
+from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.world.known import Known
 from marl_airhockey.sim.world.observer import Observation, Observer
 from marl_airhockey.types import ALL, Array, Rows
@@ -66,7 +67,10 @@ class DrivenSeat:
         """Begin an episode in some worlds, by index (W,), with the same streams."""
         self._held[worlds] = 0.0
         rng = self._streams.of(self._purpose, worlds)
-        rows = self.driver.reset(self._seat, rng, len(worlds))
+        self._keep(self.driver.reset(self._seat, rng, len(worlds)), worlds)
+
+    def _keep(self, rows: Mapping[str, Array], worlds: Rows) -> None:
+        """Store the memory of the driver in some worlds."""
         for name, row in rows.items():
             if name not in self._memory:
                 shape = (self._num_worlds, *row.shape[1:])
@@ -103,8 +107,7 @@ class DrivenSeat:
             raise ValueError(
                 f"{who}: act() returned nan or inf; actions must be finite"
             )
-        for name, value in kept.items():
-            self._memory[name][worlds] = value
+        self._keep(kept, worlds)
         self._held[worlds] = np.where(due[:, None], action, held)
         return self._held[worlds]
 
@@ -112,9 +115,11 @@ class DrivenSeat:
         """Return the view of the driver in some worlds, with one row for each world."""
         sensed = known.sensed
 
-        def read() -> Observation:
+        def read(seen: State | None) -> Observation:
             seats, form = np.array([self.index]), self.driver.observe
-            shown = self._observer.read(sensed, known.memory, seats, form, worlds)
+            if seen is not None:
+                seen = self._in_table_frame(seen, state)
+            shown = self._observer.read(sensed, known.memory, seats, form, worlds, seen)
             if isinstance(shown, Mapping):
                 return {name: array[:, 0] for name, array in shown.items()}
             return np.asarray(shown)[:, 0]
@@ -144,3 +149,18 @@ class DrivenSeat:
             scenario_memory=memory,
             reaction=self._observer.reaction,
         )
+
+    def _in_table_frame(self, seen: State, state: State) -> State:
+        """Return a state in the table frame, with the own paddle of another state.
+
+        Args:
+            seen: State (W, ...), ego frame.
+            state: State (W, ...) with the own paddle at the time of the other bodies,
+                table frame.
+        """
+        rows = []
+        for name in ("position", "velocity"):
+            row = getattr(seen, name) @ self._rotation
+            row[:, self.index] = getattr(state, name)[:, self.index]
+            rows.append(row)
+        return replace(seen, position=rows[0], velocity=rows[1])

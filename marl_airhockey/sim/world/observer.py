@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.jit.fused import Fused, Sink, Source
 from marl_airhockey.sim.jit.pipeline import Stage
-from marl_airhockey.sim.sensing.reaction import Parts, ReactionDelay
+from marl_airhockey.sim.sensing.reaction import Parts, ReactionDelay, whole_steps
 from marl_airhockey.sim.sensing.sensor import Sensor
 from marl_airhockey.types import ALL, Array, Memory, Rows
 
@@ -66,7 +67,7 @@ class Observer:
         self.observe = self.forms[0]
         """Observation type of the open seats."""
         self._top_speed = physics.highest("paddle_speed")
-        steps = _whole_steps(scenario.reaction, sensor.control_dt)
+        steps = whole_steps(scenario.reaction, sensor.control_dt)
         self._delay = ReactionDelay(steps) if steps else None
         self.reaction = steps * sensor.control_dt
         """Latency of observations by the rules of the game, s."""
@@ -172,6 +173,7 @@ class Observer:
         seats: Array,
         form: str | None = None,
         worlds: Rows = ALL,
+        seen: State | None = None,
     ) -> Observation:
         """Return observations of some seats, in their order, in new arrays.
 
@@ -181,12 +183,17 @@ class Observer:
             seats: Indices of the seats (n,).
             form: Observation type; None for the type of the open seats.
             worlds: Worlds to observe.
+            seen: Positions and velocities in these worlds that are observed instead of
+                the sensed ones, table frame; None for the sensed ones. Histories and
+                images are always the sensed ones.
         """
         form = form or self.observe
         self.layout_of(form)
         if form == "pixels":
             return self._pictures(memory, seats, worlds)
         fused, sources = self._fused[form], self._sources(sensed, memory, form)
+        if seen is not None:
+            sources[0].update(_replaced(sources[0], seen, worlds))
         every = isinstance(worlds, slice)
         found = fused(*sources) if every else fused.at(np.asarray(worlds), *sources)
         return self.of_seats(found[0], seats)
@@ -227,7 +234,7 @@ class Observer:
 
     def _sources(
         self, sensed: State, memory: Memory, form: str
-    ) -> tuple[Source, Source, Source]:
+    ) -> tuple[dict[str, Any], Source, Source]:
         """Return the arrays of all worlds from which an observation is computed."""
         state, known = self.known(sensed, memory, form)
         sensor = self.sensor.past()
@@ -237,7 +244,7 @@ class Observer:
             # Compiled loops require contiguous arrays.
             own = sensed.paddle, sensed.paddle_velocity
             sensor["own"], sensor["own_velocity"] = map(np.ascontiguousarray, own)
-        return vars(state), known, sensor
+        return dict(vars(state)), known, sensor
 
     def _show(
         self, layout: ObservationLayout, sensed: Source, memory: Memory, sensor: Source
@@ -266,21 +273,13 @@ class Observer:
         return pictures_of(self.scenario.scene, frames[worlds], goals, seats, PIXELS)
 
 
-def _whole_steps(reaction: float, control_dt: float) -> int:
-    """Return a reaction time in control steps.
-
-    Raises:
-        ValueError: It is not a multiple of ``control_dt``.
-    """
-    steps = round(reaction / control_dt)
-    if abs(steps * control_dt - reaction) > 1e-6:
-        near = [k * control_dt for k in (steps, steps + 1)]
-        raise ValueError(
-            f"reaction: {reaction:g} s is not a multiple of control_dt, "
-            f"{control_dt:g} s; set another control_dt or an option, e.g. "
-            f'options={{"reaction": {near[0]:g}}} or {near[1]:g}'
-        )
-    return steps
+def _replaced(source: Source, seen: State, worlds: Rows) -> dict[str, Array]:
+    """Return positions and velocities of all worlds, replaced in some of them."""
+    replaced = {}
+    for name in ("position", "velocity"):
+        replaced[name] = source[name].copy()
+        replaced[name][worlds] = getattr(seen, name)
+    return replaced
 
 
 def duplicate(observation: Observation) -> Observation:
