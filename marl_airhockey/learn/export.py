@@ -80,7 +80,7 @@ def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> Numpy
         "date": datetime.date.today().isoformat(),
         "grades": metrics,
     }
-    frozen = NumpyPolicy(last.layers, last.centre, last.unit, last.log_std, card)
+    frozen = NumpyPolicy(last.layers, last.centre, last.unit, last.log_std, card=card)
     out.parent.mkdir(parents=True, exist_ok=True)
     if out.suffix == ".onnx":
         from marl_airhockey.learn.onnx_export import save_onnx

@@ -38,7 +38,8 @@ def policy_of_weights(
     centre, unit = map(_array, scale)
     goals = (0, pairs[0][0].shape[1] - len(centre))
     unit = np.pad(unit, goals, constant_values=1.0)
-    return NumpyPolicy(pairs, np.pad(centre, goals), unit, _array(log_std), card)
+    centre, log_std = np.pad(centre, goals), _array(log_std)
+    return NumpyPolicy(pairs, centre, unit, log_std, card=card)
 
 
 def _array(tensor: Any) -> Any:
