@@ -1,8 +1,10 @@
 """Render images for the docs: every scenario in a scripted episode.
 
     python scripts/reproduce/pictures.py --out docs/images
+    python scripts/reproduce/pictures.py --out docs/images --arm
 
-The script writes ``tasks.png`` and ``games.png``.
+The first command writes ``tasks.png`` and ``games.png``, and the second ``arm.png``, a
+duel of two arms, which requires robosuite.
 """
 
 from __future__ import annotations
@@ -10,57 +12,91 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import cv2
 import numpy as np
 import typer
+from PIL import Image
 
 import marl_airhockey as ah
 from marl_airhockey.rollouts.play import play
+from marl_airhockey.sim.contracts.palette import LIGHT, rgb
 from marl_airhockey.sim.render.picture import draw
 from marl_airhockey.sim.render.renderer import Renderer
 from marl_airhockey.types import Array
 
-COLUMNS = 2
+COLUMNS, GAP = 2, 12
+"""Number of images in a row, and pixels between them."""
 MOMENT = 1.9
-"""Time of the image, s, unless the episode ends before."""
+"""Time of the image of a game, s."""
+VIEWS = "frontview", "agentview", "birdview"
+SEEDS = range(2, 22)
+"""Seeds that are played until an episode succeeds."""
 WIDE = 1.5
 """Ratio of length to width below which tables are rendered smaller."""
 
 
 def moment(name: str, width: int) -> Array:
-    """Return an image of a scenario with scripted drivers at all seats."""
+    """Return an image of a game, or of the success of a task, by scripted drivers."""
     seats = ah.make_scenario(name).scene.seats
     driver = "allround" if len(seats) > 1 else "striker"
     driver = "reacher" if name.startswith("reach") else driver
     drivers = {f"paddle_{i}": driver for i in range(len(seats))}
     world = ah.make_world(name, drivers=drivers)
     world.autoreset = False
-    world.reset(2)
     renderer = Renderer(world, "rgb_array", name.replace("_", " "))
-    for _ in play(world):
-        renderer.follow()
-        if world.state.time[0] >= MOMENT:
+    for seed in SEEDS:
+        world.reset(seed)
+        renderer.begin()
+        for _ in play(world):
+            renderer.follow()
+            if len(seats) > 1 and world.state.time[0] >= MOMENT:
+                break
+        if len(seats) > 1 or world.episode.success.any():
             break
     x, y = world.scene.table.size
-    return draw(renderer.frame(), width if x > WIDE * y else round(0.54 * width))
+    return draw(renderer.frame(), width if x > WIDE * y else round(0.75 * width))
+
+
+def arms(width: int, seconds: float = 1.5) -> Array:
+    """Return an image of two arms in a duel, ``width`` is that of the small views."""
+    drivers = {"paddle_0": "allround", "paddle_1": "allround"}
+    options = {"seats": "robot"}
+    world = ah.make_world("duel", drivers=drivers, backend="robosuite", options=options)
+    world.autoreset = False
+    world.reset(1)
+    for _ in play(world):
+        if world.state.time[0] >= seconds:
+            break
+    large, *small = (
+        Renderer(world, "rgb_array", "", viewpoint=view).take_picture(size)
+        for view, size in zip(VIEWS, (2 * width, width, width), strict=True)
+    )
+    return np.hstack([large, np.vstack(small)])
 
 
 def save(path: Path, image: Array) -> None:
     """Write an image (H, W, 3) as a PNG file."""
-    cv2.imwrite(str(path), cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    Image.fromarray(image).save(path, optimize=True)
 
 
 def sheet(pictures: list[Array], width: int) -> Array:
-    """Return one image with several images in rows, on white."""
-    rows = []
-    for i in range(0, len(pictures), COLUMNS):
-        some = pictures[i : i + COLUMNS]
-        row = np.full((max(map(len, some)), COLUMNS * width, 3), 255, np.uint8)
-        for k, picture in enumerate(some):
-            height, wide = picture.shape[:2]
-            row[:height, k * width : k * width + wide] = picture
-        rows.append(row)
-    return np.concatenate(rows, axis=0)
+    """Return one image with several images in centred rows, the narrow ones last."""
+    total, rows = COLUMNS * width + GAP, list[list[Array]]()
+    for picture in sorted(pictures, key=lambda picture: -picture.shape[1]):
+        filled = sum(p.shape[1] + GAP for p in rows[-1]) if rows else total
+        if filled + picture.shape[1] > total:
+            rows.append([])
+        rows[-1].append(picture)
+    high = sum(max(map(len, row)) + GAP for row in rows) - GAP
+    image = np.full((high, total, 3), rgb(LIGHT["room"]), np.uint8)
+    top = 0
+    for row in rows:
+        left = (total - sum(p.shape[1] + GAP for p in row) + GAP) // 2
+        for picture in row:
+            high, wide = picture.shape[:2]
+            image[top : top + high, left : left + wide] = picture
+            left += wide + GAP
+        top += max(map(len, row)) + GAP
+    return image
 
 
 def main(
@@ -68,9 +104,13 @@ def main(
         "docs/images"
     ),
     width: Annotated[int, typer.Option(help="Width of one image, px.")] = 560,
+    arm: Annotated[bool, typer.Option("--arm", help="Only the image of arms.")] = False,
 ) -> None:
     """Play all scenarios, and write one image of the tasks and one of the games."""
     out.mkdir(parents=True, exist_ok=True)
+    if arm:
+        save(out / "arm.png", arms(320))
+        return
     kinds: dict[str, list[Array]] = {"tasks": [], "games": []}
     for name in ah.scenario_names():
         alone = len(ah.make_scenario(name).scene.seats) == 1

@@ -1,27 +1,32 @@
-"""Camera frame with the estimated bodies and marks drawn over it."""
+"""Camera frame with the estimated bodies and marks drawn over it.
+
+The ring of the puck is yellow, although the palette has dark pucks: it is the estimate
+and must differ from the real puck in the frame. It can be next to that puck, because
+the estimate is of the current time and the frame is older by its latency. All lines
+have dark edges, so that they are visible on a bright table.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import get_args
 
 import cv2
 import numpy as np
 
 from marl_airhockey.hardware.vision.lens import CameraView
 from marl_airhockey.sim.contracts.mark import Mark, Meaning
+from marl_airhockey.sim.contracts.palette import LIGHT, SEATS, rgb
 from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
 CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 37)) for f in (np.cos, np.sin)], 1)
-PUCK, PADDLE, RAIL = (255, 240, 0), (255, 140, 0), (90, 140, 255)
-"""Colours: red, green, blue."""
-MARKS: dict[Meaning, tuple[int, int, int]] = {
-    "goal": (0, 220, 120),
-    "reward": (255, 215, 60),
-    "cost": (255, 60, 60),
-    "drag": (170, 180, 200),
-}
-"""Colours of marks by their meaning."""
+PUCK, PADDLE, RAIL, EDGE = (
+    rgb(colour)
+    for colour in (LIGHT["estimate"], SEATS[0], LIGHT["print"], LIGHT["ink"])
+)
+MARKS = {meaning: rgb(LIGHT[meaning]) for meaning in get_args(Meaning)}
+"""Colours of marks by meaning."""
 AHEAD = 0.15
 """Time for which the velocity line extends the puck's motion, s."""
 
@@ -75,7 +80,8 @@ class Overlay:
         return np.asarray(drawn)
 
     def _line(self, image: Array, points: Array, colour: tuple[int, int, int]) -> None:
-        """Draw a line through points (n, 2) on the table."""
+        """Draw a line with dark edges through points (n, 2) on the table."""
         flat = np.column_stack([points, np.zeros(len(points))])
         pixels = np.round(self._view.project(flat) * 16).astype(np.int32)
-        cv2.polylines(image, [pixels], False, colour, 2, cv2.LINE_AA, 4)
+        for ink, width in ((EDGE, 4), (colour, 2)):
+            cv2.polylines(image, [pixels], False, ink, width, cv2.LINE_AA, 4)

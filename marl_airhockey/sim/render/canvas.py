@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from marl_airhockey.sim.contracts.palette import LIGHT, rgb
 from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
 Colour = tuple[int, int, int]
 """Colour in RGB, 0 to 255."""
-ROOM: Colour = (236, 239, 243)
 SMOOTH = 2
 """Factor by which the canvas is larger than the image, for anti-aliasing."""
 SHIFT = 6
@@ -37,7 +37,7 @@ class Canvas:
         tall = round(float(high[1] - self.low[1]) * self.scale) + self.bar
         # Video codecs require even sizes.
         tall += -tall % (2 * SMOOTH)
-        self.image = np.full((tall, SMOOTH * width, 3), ROOM, np.uint8)
+        self.image = np.full((tall, SMOOTH * width, 3), rgb(LIGHT["room"]), np.uint8)
         self.bottom = tall
 
     def pixel(self, point: Sequence[float] | Array) -> tuple[int, int]:
@@ -88,16 +88,21 @@ class Canvas:
         else:
             cv2.fillPoly(self.image, [points], colour, cv2.LINE_AA, SHIFT)
 
-    def text(
-        self, words: str, x: int, size: float, colour: Colour, right: bool
+    def titles(
+        self, left: str, right: str, colours: tuple[Colour, Colour], size: float = 0.55
     ) -> None:
-        """Write a text in the title bar, ``x`` pixels from its left or right end."""
-        font, thick = cv2.FONT_HERSHEY_DUPLEX, SMOOTH
+        """Write texts at both ends of the title bar, smaller if they do not fit."""
+        font, width, edge = cv2.FONT_HERSHEY_DUPLEX, self.image.shape[1], 22 * SMOOTH
+        texts = left, right
         scale = size * SMOOTH
-        (wide, high), _ = cv2.getTextSize(words, font, scale, thick)
-        left = self.image.shape[1] - x * SMOOTH - wide if right else x * SMOOTH
-        corner = (left, (self.bar + high) // 2)
-        cv2.putText(self.image, words, corner, font, scale, colour, thick, cv2.LINE_AA)
+        needed = sum(cv2.getTextSize(t, font, scale, SMOOTH)[0][0] for t in texts)
+        scale *= min(1.0, (width - 3 * edge) / max(needed, 1))
+        for k, (text, colour) in enumerate(zip(texts, colours, strict=True)):
+            (wide, high), _ = cv2.getTextSize(text, font, scale, SMOOTH)
+            corner = (width - edge - wide if k else edge, (self.bar + high) // 2)
+            cv2.putText(
+                self.image, text, corner, font, scale, colour, SMOOTH, cv2.LINE_AA
+            )
 
     def finish(self) -> Array:
         """Return the image (H, W, 3) uint8 RGB, a new array."""

@@ -9,46 +9,36 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import get_args
 
 import numpy as np
 
 from marl_airhockey.sim.contracts.mark import Mark, Meaning
+from marl_airhockey.sim.contracts.palette import LIGHT, SEATS, rgb
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.render.canvas import SMOOTH, Canvas, Colour
 from marl_airhockey.types import Array
 
-SEAT_COLOURS: tuple[Colour, ...] = (
-    (0, 114, 178),
-    (213, 94, 0),
-    (0, 158, 115),
-    (204, 121, 167),
-    (86, 180, 233),
-    (230, 159, 0),
+SEAT_COLOURS: tuple[Colour, ...] = tuple(map(rgb, SEATS))
+RAIL, FIELD, PRINT, FAINT, INK, PUCK, BLOCK = (
+    rgb(LIGHT[name])
+    for name in ("rail", "field", "print", "faint", "ink", "puck", "block")
 )
-"""Colours of seats, RGB: Okabe and Ito's palette, safe for colour-blind people."""
-RAIL, FIELD = (52, 62, 76), (250, 251, 253)
-PRINT, FAINT, INK = (168, 196, 224), (214, 226, 238), (34, 40, 49)
-PUCK, PUCK_RIM, BLOCK, BLOCK_RIM = (
-    (46, 52, 64),
-    (20, 24, 31),
-    (222, 184, 112),
-    (150, 112, 50),
-)
-GOAL = (200, 60, 90)
 CIRCLES: dict[Meaning, Colour] = {
-    "goal": GOAL,
-    "reward": (170, 125, 10),
-    "cost": (213, 94, 0),
-    "drag": (105, 116, 134),
+    meaning: rgb(LIGHT[meaning]) for meaning in get_args(Meaning)
 }
 """Colours of circles by meaning."""
+GOAL = CIRCLES["goal"]
 SIGNS: dict[Meaning, list[tuple[float, float, float, float]]] = {
     "reward": [(-1, 0, 1, 0), (0, -1, 0, 1)],
     "cost": [(-1, 0, 1, 0)],
     "drag": [(-1, -0.5, 1, -0.5), (-1, 0.5, 1, 0.5)],
 }
 """Lines of the sign at the centre of a region, in quarters of its radius."""
+TRAIL, SERVED = 0.6, 0.4
+"""Half the width of a trail at the puck, in radii of the puck, and the distance, m,
+above which a puck was re-served between two points."""
 WIDTH = 880
 """Default width of an image, pixels."""
 
@@ -79,8 +69,8 @@ def draw(frame: Frame, width: int = WIDTH) -> Array:
     _table(canvas, frame)
     for mark in frame.marks:
         _mark(canvas, mark)
-    for trail in frame.trails:
-        _trail(canvas, trail, frame.scene.table.puck_radius)
+    for trail, puck in zip(frame.trails, frame.state.puck, strict=False):
+        _trail(canvas, trail, puck, frame.scene.table.puck_radius)
     _bodies(canvas, frame.scene, frame.state)
     for mark in frame.marks:
         # Draw a goal that a paddle can hide again, over the paddle.
@@ -101,7 +91,7 @@ def _table(canvas: Canvas, frame: Frame) -> None:
     canvas.polygon(grown, RAIL)
     canvas.polygon(corners, FIELD)
     half = table.size[1] / 2
-    canvas.ring((0, 0), 0.16, FAINT, 2)
+    canvas.ring((0, 0), 0.14, PRINT, 2)
     if len(corners) == 4 and len(set(sides)) <= 2:
         canvas.line((0, -half), (0, half), PRINT, 2)
         for x in (-table.size[0] / 4, table.size[0] / 4):
@@ -118,7 +108,7 @@ def _table(canvas: Canvas, frame: Frame) -> None:
             continue
         near, out = scene.opening(goal_line), -0.04 * table.normals[goal_line.side]
         gap = np.array([*near, *(near + out)[::-1]])
-        canvas.polygon(gap, _pale(_seat_colour(scene, owner), 0.55))
+        canvas.polygon(gap, _seat_colour(scene, owner))
 
 
 def _mark(canvas: Canvas, mark: Mark) -> None:
@@ -142,12 +132,27 @@ def _mark(canvas: Canvas, mark: Mark) -> None:
             canvas.polygon(head, GOAL)
 
 
-def _trail(canvas: Canvas, trail: Sequence[tuple[float, float]], radius: float) -> None:
-    for i, (a, b) in enumerate(pairwise(trail)):
-        age = (i + 1) / len(trail)
-        if np.hypot(b[0] - a[0], b[1] - a[1]) < 0.4:
-            wide = age * radius * canvas.scale / SMOOTH
-            canvas.line(a, b, _pale(PUCK, 1 - 0.3 * age), wide)
+def _trail(
+    canvas: Canvas,
+    trail: Sequence[tuple[float, float]],
+    puck: Array,
+    radius: float,
+) -> None:
+    """Draw a trail that ends at the puck (2,) and is narrow and pale at its start."""
+    # The newest point can be later than the drawn puck.
+    points = np.array([*trail[:-1], puck])
+    for i, (a, b) in enumerate(pairwise(points), 1):
+        along = b - a
+        length = float(np.hypot(*along))
+        if not 0 < length < SERVED:
+            continue
+        widths = TRAIL * radius * np.array([i - 1, i]) / len(points)
+        across = np.array([-along[1], along[0]]) / length
+        first, last = widths[0] * across, widths[1] * across
+        colour = _pale(PUCK, 1 - 0.3 * i / len(points))
+        canvas.polygon(np.array([a + first, b + last, b - last, a - first]), colour)
+        canvas.disc(a, widths[0], colour)
+        canvas.disc(b, widths[1], colour)
 
 
 def _bodies(canvas: Canvas, scene: Scene, state: State) -> None:
@@ -162,13 +167,13 @@ def _bodies(canvas: Canvas, scene: Scene, state: State) -> None:
     for k in range(bodies.block.start, bodies.block.stop):
         if scene.block_shape == "disc":
             canvas.disc(position[k], radius[k], BLOCK)
-            canvas.ring(position[k], radius[k], BLOCK_RIM, thin)
+            canvas.ring(position[k], radius[k], _dark(BLOCK), thin)
         else:
             c, s = np.cos(state.angle[k]), np.sin(state.angle[k])
             square = radius[k] * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
             corners = position[k] + square @ np.array([[c, s], [-s, c]])
             canvas.polygon(corners, BLOCK)
-            canvas.polygon(corners, BLOCK_RIM, thin)
+            canvas.polygon(corners, _dark(BLOCK), thin)
     for k in range(bodies.paddles):
         colour = _seat_colour(scene, k)
         canvas.disc(position[k], radius[k], colour)
@@ -177,7 +182,7 @@ def _bodies(canvas: Canvas, scene: Scene, state: State) -> None:
         canvas.ring(position[k], radius[k] * 0.52, _dark(colour), 1)
     for k in range(bodies.puck.start, bodies.puck.stop):
         canvas.disc(position[k], radius[k], PUCK)
-        canvas.ring(position[k], radius[k] * 0.96, PUCK_RIM, 1)
+        canvas.ring(position[k], radius[k] * 0.96, _dark(PUCK), 1)
         canvas.ring(position[k], radius[k] * 0.55, _pale(PUCK, 0.35), thin)
         # A stripe shows the spin.
         angle = float(state.angle[k])
@@ -188,9 +193,9 @@ def _bodies(canvas: Canvas, scene: Scene, state: State) -> None:
 def _bar(canvas: Canvas, frame: Frame) -> None:
     width = canvas.image.shape[1]
     canvas.image[: canvas.bar] = FIELD
-    canvas.text(frame.title, 22, 0.55, INK, right=False)
     note = frame.note + ("   success" if frame.success else "")
-    canvas.text(note, 22, 0.5, (0, 130, 95) if frame.success else INK, right=True)
+    colours = INK, _dark(GOAL) if frame.success else INK
+    canvas.titles(frame.title, note, colours)
     done = round(width * min(max(frame.clock, 0.0), 1.0))
     strip = slice(canvas.bar - 3 * SMOOTH, canvas.bar)
     canvas.image[strip] = FAINT

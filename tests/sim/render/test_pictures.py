@@ -60,3 +60,18 @@ def test_regions_show_what_they_are():
     colours = env.render().reshape(-1, 3).astype(int)
     for means, colour in CIRCLES.items():
         assert (np.abs(colours - colour).max(-1) < 12).sum() > 60, means
+
+
+def test_trail_ends_at_the_drawn_puck():
+    scene = ah.make_scenario("strike").scene
+    state = scene.still_state(1).map(lambda x: x[0])
+    state.position[scene.bodies.puck] = [0.2, 0.1]
+    plain = draw(Frame(scene, state)).astype(int)
+    ahead = [[(0.05, 0.1), (0.12, 0.1), (0.35, 0.1)]]
+    row, columns = np.nonzero(
+        np.abs(draw(Frame(scene, state, trails=ahead)) - plain).max(-1) > 8
+    )
+    assert len(row) > 100
+    wide = scene.table.size[0] + 0.15
+    puck = round((0.2 + wide / 2) / wide * 880)
+    assert columns.max() < puck

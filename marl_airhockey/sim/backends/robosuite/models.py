@@ -7,9 +7,16 @@ from pathlib import Path
 import numpy as np
 from robosuite.models.arenas import Arena
 from robosuite.models.grippers import GripperModel, register_gripper
-from robosuite.utils.mjcf_utils import array_to_string, new_body, new_geom, new_joint
+from robosuite.utils.mjcf_utils import (
+    array_to_string,
+    find_elements,
+    new_body,
+    new_geom,
+    new_joint,
+)
 
 from marl_airhockey.sim.backends.robosuite.frames import TableFrame
+from marl_airhockey.sim.contracts.palette import LIGHT, SEATS, rgb
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.types import Array
 
@@ -25,14 +32,26 @@ TALL = 0.02
 LOW = 0.004
 """Height at which pucks and round blocks touch, m. A higher contact would tilt the
 paddle if a puck is caught between paddle and rail."""
+STEP = 0.001
+"""Difference in height between layers of one colour, m."""
+RING, INNER = 0.8, 0.6
+"""Radii of the bright ring on a puck, in radii of the puck."""
 
 
 @register_gripper
 class AirHockeyPaddle(GripperModel):
-    """Round paddle in place of a gripper, without joints."""
+    """Round paddle in place of a gripper, without joints.
 
-    def __init__(self, idn: int = 0) -> None:
+    Args:
+        idn: Name of the arm, which begins with the number of its seat.
+    """
+
+    def __init__(self, idn: int | str = 0) -> None:
         super().__init__(str(HERE / "paddle.xml"), idn=idn)
+        seat = int(str(idn).partition("_")[0])
+        name = self.correct_naming("disc_visual")
+        disc = find_elements(self.root, "geom", {"name": name}, return_first=True)
+        disc.set("rgba", _rgba(SEATS[seat % len(SEATS)]))
 
     def format_action(self, action: Array) -> Array:
         return action
@@ -83,7 +102,7 @@ class AirHockeyArena(Arena):
             size=array_to_string([*size, 0.025]),
             pos="0 0 -.0251",
             material="field",
-            **_visual(),
+            **_visual(LIGHT["field"]),
         )
         self._add(
             "surface",
@@ -105,7 +124,10 @@ class AirHockeyArena(Arena):
         goal_lines = [
             m for m in scene.goal_lines if m.side == side and m.width is not None
         ]
-        posts = [start, *(p for m in goal_lines for p in scene.opening(m)), end]
+        openings = [scene.opening(m) for m in goal_lines]
+        posts = [start, *(p for opening in openings for p in opening), end]
+        for opening in openings:
+            self._goal(side, opening)
         for k in range(0, len(posts), 2):
             # Pieces end at posts and overlap at corners.
             a = posts[k] - along * THICK * (k == 0)
@@ -119,10 +141,13 @@ class AirHockeyArena(Arena):
                 "xyaxes": array_to_string([*along, 0, -along[1], along[0], 0]),
             }
             name = f"rail{side}_{k // 2}"
-            self._add(f"{name}_visual", "box", material="rail", **box, **_visual())
-            if goal_lines:
+            # Equal heights would flicker where the rails of two sides overlap.
+            seen = [np.linalg.norm(b - a) / 2, THICK / 2, TALL - 0.001 * (side % 2)]
+            visual = {**box, "size": array_to_string(seen), **_visual(LIGHT["rail"])}
+            self._add(f"{name}_visual", "box", **visual)
+            if openings:
                 self._add(name, "box", priority="3", **box, **_sliding(RAIL))
-        if not goal_lines:
+        if not openings:
             self._add(
                 f"rail{side}_0",
                 "plane",
@@ -133,6 +158,21 @@ class AirHockeyArena(Arena):
                 **_sliding(RAIL),
             )
 
+    def _goal(self, side: int, opening: Array) -> None:
+        """Add a strip in the colour of its seat in an opening (2, 2), m, of a side."""
+        sides = [seat.side for seat in self.scene.seats]
+        owner = sides.index(side) if side in sides else 0
+        along, normal = opening[1] - opening[0], self.scene.table.normals[side]
+        middle = opening.mean(0) - normal * THICK / 2
+        self._add(
+            f"goal{side}_visual",
+            "box",
+            size=array_to_string([np.linalg.norm(along) / 2, THICK / 2, STEP]),
+            pos=array_to_string([*middle, STEP]),
+            xyaxes=array_to_string([*along, 0, -along[1], along[0], 0]),
+            **_visual(SEATS[owner % len(SEATS)]),
+        )
+
     def _mover(self, name: str, kind: str, radius: float) -> None:
         """Add a puck or a block, which moves and rotates in the plane of the table."""
         body = new_body(name, pos=f"0 0 {TALL}")
@@ -142,16 +182,24 @@ class AirHockeyArena(Arena):
         square = kind == "block" and self.scene.block_shape == "square"
         shape = "box" if square else "cylinder"
         size = [radius, radius, TALL] if square else [radius, TALL]
-        body.append(
-            new_geom(
-                f"{name}_visual",
-                shape,
-                size=array_to_string(size),
-                material=kind,
-                mass="0",
-                **_visual(),
+        layers = {"": (shape, size, LIGHT[kind])}
+        if kind == "puck":
+            inner = INNER * radius
+            layers["_ring"] = "cylinder", [RING * radius, TALL + STEP], LIGHT["field"]
+            layers["_top"] = "cylinder", [inner, TALL + 2 * STEP], LIGHT["puck"]
+            # A stripe shows the spin.
+            stripe = [inner, 0.2 * inner, TALL + 3 * STEP]
+            layers["_stripe"] = "box", stripe, LIGHT["field"]
+        for layer, (form, sizes, colour) in layers.items():
+            body.append(
+                new_geom(
+                    f"{name}{layer}_visual",
+                    form,
+                    size=array_to_string(sizes),
+                    mass="0",
+                    **_visual(colour),
+                )
             )
-        )
         body.append(
             new_geom(
                 name,
@@ -179,7 +227,7 @@ class AirHockeyArena(Arena):
     def _stand(self, name: str, kind: str, top: Array, size: str) -> None:
         x, y, z = top
         size, pos = f"{size} {z / 2}", array_to_string([x, y, z / 2])
-        rest = {"size": size, "pos": pos, "material": "rail", **_visual()}
+        rest = {"size": size, "pos": pos, **_visual(LIGHT["rail"])}
         self.worldbody.append(new_geom(f"{name}_visual", kind, **rest))
 
     def _obstacle(
@@ -189,7 +237,7 @@ class AirHockeyArena(Arena):
         end: tuple[float, float] | None,
         radius: float,
     ) -> None:
-        name, visual = f"obstacle{k}", {"material": "rail", **_visual()}
+        name, visual = f"obstacle{k}", _visual(LIGHT["rail"])
         ends = [start] if end is None or end == start else [start, end]
         for i, point in enumerate(ends):
             post = {
@@ -213,8 +261,13 @@ class AirHockeyArena(Arena):
         self._add(name, "capsule", priority="3", **shape, **_sliding(SLIDES | RAIL))
 
 
-def _visual() -> dict[str, str]:
-    return {"group": "1", "contype": "0", "conaffinity": "0"}
+def _rgba(colour: str) -> str:
+    return str(array_to_string([*(value / 255 for value in rgb(colour)), 1.0]))
+
+
+def _visual(colour: str) -> dict[str, str]:
+    bits = {"contype": "0", "conaffinity": "0"}
+    return {"group": "1", "rgba": _rgba(colour), **bits}
 
 
 def _collision(bits: int) -> dict[str, str]:

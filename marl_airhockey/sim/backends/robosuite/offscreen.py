@@ -5,24 +5,42 @@ from __future__ import annotations
 import atexit
 import weakref
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, get_args
 
 import mujoco
 import numpy as np
 
 from marl_airhockey.sim.backends.robosuite.frames import TableFrame
 from marl_airhockey.sim.contracts.mark import Mark, Meaning
+from marl_airhockey.sim.contracts.palette import LIGHT, rgb
 from marl_airhockey.types import Array
 
-COLOURS: dict[Meaning, tuple[float, float, float, float]] = {
-    "goal": (0.0, 0.62, 0.45, 0.55),
-    "reward": (0.9, 0.75, 0.1, 0.5),
-    "cost": (0.84, 0.37, 0.0, 0.5),
-    "drag": (0.41, 0.45, 0.53, 0.5),
+COLOURS: dict[Meaning, Array] = {
+    meaning: np.array([*rgb(LIGHT[meaning]), 140]) / 255
+    for meaning in get_args(Meaning)
 }
-"""Colours of marks by meaning, RGBA, 0 to 1."""
+"""Colours of marks by meaning, RGBA (4,), 0 to 1."""
+SHADOWS = 4096
+"""Resolution of shadows, pixels."""
 THIN = 0.004
 """Half the width of a line, and half the height of a circle, m."""
+LOOK_AT, DISTANCE = (0.0, 0.0, 0.9), 2.6
+"""Centre (3,) of the view of `whole_table`, and its distance from the camera, m."""
+ELEVATION, FIELD = -43.0, 36.0
+"""Direction of the camera of `whole_table`, and its vertical field of view, degrees."""
+
+
+def whole_table(model: Any) -> Any:
+    """Return a camera, `mujoco.MjvCamera`, from which arms at both ends are visible.
+
+    Args:
+        model: MuJoCo model, whose field of view changes for all free cameras.
+    """
+    model.vis.global_.fovy = FIELD
+    camera = mujoco.MjvCamera()
+    camera.lookat[:], camera.distance = LOOK_AT, DISTANCE
+    camera.azimuth, camera.elevation = 90.0, ELEVATION
+    return camera
 
 
 class OffscreenRenderer:
@@ -44,6 +62,7 @@ class OffscreenRenderer:
         # The offscreen buffer of the model limits the size of the images.
         model.vis.global_.offwidth = max(model.vis.global_.offwidth, width)
         model.vis.global_.offheight = max(model.vis.global_.offheight, height)
+        model.vis.quality.shadowsize = SHADOWS
         try:
             self._renderer = mujoco.Renderer(model, height, width)
         except Exception as error:
@@ -59,11 +78,19 @@ class OffscreenRenderer:
         self._option.geomgroup[1] = 1
         self._option.sitegroup[:] = 0
 
-    def picture(self, qpos: Array, name: str, marks: Sequence[Mark] = ()) -> Array:
-        """Return the image (H, W, 3) uint8 of a camera at ``qpos``, with marks."""
+    def picture(
+        self, qpos: Array, camera: str | Any, marks: Sequence[Mark] = ()
+    ) -> Array:
+        """Return an image (H, W, 3) uint8.
+
+        Args:
+            qpos: Positions of all joints, see `mujoco.MjData.qpos`.
+            camera: Name of a camera of the model, or a `mujoco.MjvCamera`.
+            marks: Marks on the table.
+        """
         self._data.qpos[:] = qpos
         mujoco.mj_fwdPosition(self._model, self._data)
-        self._renderer.update_scene(self._data, name, self._option)
+        self._renderer.update_scene(self._data, camera, self._option)
         for mark in marks:
             self._draw(mark)
         return np.asarray(self._renderer.render())
@@ -74,7 +101,7 @@ class OffscreenRenderer:
             return
         geom = scene.geoms[scene.ngeom]
         start = self._frame.to_world(*mark.start, THIN)
-        colour = np.array(COLOURS[mark.means])
+        colour = COLOURS[mark.means]
         if mark.kind == "circle":
             kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [mark.radius, THIN, THIN]
             orientation = self._frame.rotation.ravel()
