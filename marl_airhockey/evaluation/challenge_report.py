@@ -161,24 +161,36 @@ def _share(result: ChallengeResult) -> str:
 
 
 def plot_card(card: ChallengeReport, path: Path) -> None:
-    """Plot the success in each task as a radar chart with a line for each profile."""
-    import matplotlib.pyplot as plt
+    """Plot the score in each part as points with their 95 % intervals."""
+    from marl_airhockey.sim.render.charts import panels, point, save, series
 
-    from marl_airhockey.sim.render.charts import DPI, INK, INKS, save
+    played = [result for result in card.results if result.player]
+    parts = {
+        "success": [result for result in played if not result.opponent],
+        "score: win + draw / 2": [result for result in played if result.opponent],
+    }
+    size = 8.4, 0.36 * max(map(len, _names_of(parts).values())) + 1.6
+    figure, (grid,) = panels(1, 2, size)
+    for axes, (label, results) in zip(grid, parts.items(), strict=True):
+        names = _names_of(parts)[label]
+        for result in results:
+            k = 0 if result.opponent else card.profiles.index(result.profile)
+            shift = 0 if result.opponent else 0.2 * (k - (len(card.profiles) - 1) / 2)
+            height = names.index(result.opponent or result.scenario) + shift
+            ends = result.low, result.high
+            where = "" if result.opponent else f"profile {result.profile}"
+            point(axes, height, result.score, ends, series(k), where)
+        axes.set_yticks(range(len(names)), [name.replace("_", " ") for name in names])
+        axes.set(xlim=(-0.03, 1.03), ylim=(max(len(names), 1) - 0.4, -0.6))
+        axes.set_xlabel(f"{label} (95 % interval)")
+    grid[0].set_title(f"tasks, n = {card.episodes} episodes")
+    grid[1].set_title(f"duels, n = {card.games} games")
+    save(figure, path, card.name)
 
-    tasks = list(dict.fromkeys(r.scenario for r in card.results if not r.opponent))
-    angles = np.linspace(0.0, 2.0 * np.pi, len(tasks), endpoint=False)
-    figure, axes = plt.subplots(
-        figsize=(6.4, 6.0), dpi=DPI, layout="constrained", subplot_kw={"polar": True}
-    )
-    for profile, ink in zip(card.profiles, (INK, *INKS), strict=False):
-        share = [
-            r.score for r in card.results if not r.opponent and r.profile == profile
-        ]
-        axes.plot([*angles, angles[0]], [*share, share[0]], color=ink, label=profile)
-    axes.set_ylim(0.0, 1.0)
-    axes.set_xticks(angles, [task.replace("_", "\n") for task in tasks], size=8)
-    axes.tick_params(axis="x", pad=12)
-    axes.set_title(f"{card.name}: success", pad=24)
-    axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(-0.12, -0.08))
-    save(figure, path)
+
+def _names_of(parts: dict[str, list[ChallengeResult]]) -> dict[str, list[str]]:
+    """Return the names of the tasks and of the opponents."""
+    return {
+        label: list(dict.fromkeys(r.opponent or r.scenario for r in results))
+        for label, results in parts.items()
+    }

@@ -154,13 +154,12 @@ def _rate(run: Callable[[], int], seconds: float) -> tuple[float, float]:
 
 def plot_speed(rates: Sequence[StepRate], path: Path) -> None:
     """Plot environment steps per CPU-second against the number of worlds."""
-    import matplotlib.pyplot as plt
+    from marl_airhockey.sim.render.charts import panels, save, series
 
-    from marl_airhockey.sim.render.charts import DPI, save, tidy
-
-    figure, axes = plt.subplots(figsize=(7.2, 4.4), dpi=DPI, layout="constrained")
-    names = {(r.case.scenario, r.case.backend) for r in rates}
-    for scenario, backend in sorted(names):
+    names = sorted({(r.case.scenario, r.case.backend) for r in rates})
+    figure, grid = panels(size=(7.2, 4.6))
+    axes = grid[0, 0]
+    for k, (scenario, backend) in enumerate(names):
         mine = [
             r
             for r in rates
@@ -169,11 +168,11 @@ def plot_speed(rates: Sequence[StepRate], path: Path) -> None:
         ]
         mine.sort(key=lambda r: r.case.worlds)
         worlds = [r.case.worlds for r in mine]
-        speed = [r.env_steps_per_cpu_s for r in mine]
-        style = "-" if backend == "numba" else "--"
-        axes.plot(worlds, speed, style, marker="o", label=f"{scenario}, {backend}")
+        speed, look = [r.env_steps_per_cpu_s for r in mine], series(k)
+        axes.plot(worlds, speed, label=f"{scenario}, {backend}", **look.style)
     axes.set(
         xscale="log", yscale="log", xlabel="worlds", ylabel="env-steps per CPU-second"
     )
-    tidy(axes)
-    save(figure, path)
+    spread = 100 * max(r.spread for r in rates)
+    what = f"medians over rounds, whose range is at most {spread:.0f} %"
+    save(figure, path, f"Speed with random actions:\n{what}")

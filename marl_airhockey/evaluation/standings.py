@@ -161,31 +161,36 @@ class Standings:
 
 
 def plot_scores(standings: Standings, path: Path) -> None:
-    """Plot the matrix of scores, the best player first."""
-    import matplotlib.pyplot as plt
-
-    from marl_airhockey.sim.render.charts import DPI, save
+    """Plot the matrix of scores with their 95 % intervals, the best player first."""
+    from marl_airhockey.sim.render.charts import panels, save
 
     order, count = standings.order, len(standings.names)
     score = standings.score[np.ix_(order, order)]
-    names = [standings.names[i] for i in order]
-    size = 2.6 + 0.62 * count
-    figure, axes = plt.subplots(
-        figsize=(size + 1.2, size), dpi=DPI, layout="constrained"
-    )
+    ends = standings.score_intervals[np.ix_(order, order)]
+    low, high = standings.rating_intervals.T
+    names = [
+        f"{standings.names[i]}\nElo {standings.ratings[i]:.0f} "
+        f"({low[i]:.0f}..{high[i]:.0f})"
+        for i in order
+    ]
+    size = 2.6 + 0.8 * count
+    figure, grid = panels(size=(size + 1.2, size))
+    axes = grid[0, 0]
+    axes.grid(visible=False)
     image = axes.imshow(score, cmap="RdBu", vmin=0.0, vmax=1.0)
-    for row in range(count):
-        for column in range(count):
-            if row != column:
-                value = score[row, column]
-                ink = "white" if abs(value - 0.5) > 0.32 else "black"
-                text = f"{value:.2f}"
-                axes.text(
-                    column, row, text, ha="center", va="center", color=ink, size=8
-                )
-    axes.set_xticks(range(count), names, rotation=45, ha="right")
+    for row, column in permutations(range(count), 2):
+        value = score[row, column]
+        ink = "white" if abs(value - 0.5) > 0.32 else "black"
+        style = {"ha": "center", "color": ink}
+        least, most = ends[row, column]
+        axes.text(column, row, f"{value:.2f}", va="bottom", size=10, **style)
+        axes.text(column, row, f"{least:.2f}..{most:.2f}", va="top", size=7, **style)
+    axes.set_xticks(range(count), [standings.names[i] for i in order], rotation=45)
+    for label in axes.get_xticklabels():
+        label.set(ha="right", rotation_mode="anchor")
     axes.set_yticks(range(count), names)
-    axes.set_title(f"{standings.scenario}: score of the row against the column")
     axes.spines[:].set_visible(False)
     figure.colorbar(image, ax=axes, shrink=0.7, label="win + draw / 2")
-    save(figure, path)
+    title = f"{standings.scenario}: score of the row against the column"
+    n = f"n = {standings.games} games of each pair, 95 % intervals"
+    save(figure, path, f"{title}\n{n}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from statistics import NormalDist
 from typing import Any
@@ -62,6 +63,42 @@ def bootstrap(
     ]
     low, high = np.quantile(found, [0.025, 0.975])
     return float(low), float(high)
+
+
+def over_tasks(
+    runs: Sequence[Array],
+    statistic: Callable[[Array], Any],
+    seed: int = 0,
+    resamples: int = RESAMPLES,
+) -> tuple[Array, Array, Array]:
+    """Return a statistic of the runs of several tasks, and its 95 % interval.
+
+    The interval is that of a stratified bootstrap (Agarwal et al., 2021): runs are
+    resampled within their task. All tasks have the same weight.
+
+    Args:
+        runs: Results of the runs of each task, (n,).
+        statistic: Function that computes a number or an array from results (m,).
+        seed: Seed of the resampling.
+        resamples: Number of resamples.
+
+    Returns:
+        Statistic, lower end and upper end.
+    """
+    rng, size = np.random.default_rng(seed), math.lcm(*map(len, runs))
+
+    def of(chosen: Sequence[Array]) -> Array:
+        pooled = [np.repeat(task, size // len(task)) for task in chosen]
+        return np.asarray(statistic(np.concatenate(pooled)))
+
+    found = [of([rng.choice(t, len(t)) for t in runs]) for _ in range(resamples)]
+    low, high = np.quantile(found, [0.025, 0.975], axis=0)
+    return of(runs), low, high
+
+
+def performance_profile(values: Array, levels: Array) -> Array:
+    """Return the share of results (n,) above each level (k,), an array (k,)."""
+    return np.asarray((np.asarray(values) > np.asarray(levels)[:, None]).mean(1))
 
 
 def bounded_mean(

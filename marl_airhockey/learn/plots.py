@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
 from marl_airhockey.evaluation.stats import bootstrap, iqm
-from marl_airhockey.sim.render.charts import DPI, INK, INKS, PALE, save, tidy
+from marl_airhockey.sim.render.charts import SOFT, Series, panels, save, series
 from marl_airhockey.types import Array
+
+BAND = "interquartile mean over n seeds, and its 95 % interval"
+TARGET = 0.95
+"""Success of the dotted line."""
 
 
 def plot_learning_curve(
@@ -20,7 +23,7 @@ def plot_learning_curve(
     title: str,
     path: Path,
 ) -> None:
-    """Plot success against CPU-seconds of training, with baselines as lines.
+    """Plot success of a run against CPU-seconds of training, with baselines as lines.
 
     Args:
         rows: Rows of ``evaluations.csv``.
@@ -28,29 +31,32 @@ def plot_learning_curve(
         title: Title of the plot.
         path: Path of the PNG file.
     """
-    figure, axes = plt.subplots(figsize=(7.2, 4.2), dpi=DPI, layout="constrained")
+    figure, grid = panels()
+    axes = grid[0, 0]
+    # A baseline is narrower than the one before, so that equal ones are both visible.
+    for k, (name, level) in enumerate(floors.items()):
+        wide, (colour, _, line) = 1.5 * (len(floors) - k) + 0.5, series(k + 2)
+        style = {"color": colour, "linestyle": line, "linewidth": wide, "alpha": 0.8}
+        axes.axhline(level, label=f"{name}, not trained", **style)
     cpu = [0.0, *(float(row["learning_cpu_seconds"]) for row in rows)]
-    for name, label, ink in (
-        ("success", "learned, mean action", INK),
-        ("success_sampled", "learned, sampled", PALE),
+    for k, (name, label) in enumerate(
+        (("success_sampled", "learned, sampled actions"), ("success", "learned, mean"))
     ):
-        share = [0.0, *(float(row[name]) for row in rows)]
-        axes.plot(cpu, share, color=ink, marker="o", markersize=4, label=label)
-    for (name, level), ink in zip(floors.items(), INKS, strict=False):
-        axes.axhline(level, color=ink, linestyle="--", linewidth=1.2, label=name)
+        share, look = [0.0, *(float(row[name]) for row in rows)], series(1 - k)
+        axes.plot(cpu, share, markersize=4, label=label, **look.style)
     axes.set(
         xlabel="CPU-seconds of learning, without evaluations",
         ylabel="success",
         ylim=(-0.03, 1.03),
         xlim=(0, None),
-        title=title.replace("_", " "),
     )
-    tidy(axes, "center right")
-    save(figure, path)
+    save(figure, path, f"{title.replace('_', ' ')}: one training run")
 
 
 def plot_seed_curves(
-    runs: Mapping[str, Sequence[Sequence[Mapping[str, str]]]], path: Path
+    runs: Mapping[str, Sequence[Sequence[Mapping[str, str]]]],
+    path: Path,
+    title: str = "",
 ) -> None:
     """Plot success against CPU-seconds, with one panel per task drawn by `plot_iqm`.
 
@@ -58,18 +64,12 @@ def plot_seed_curves(
         runs: Rows of each seed, by task, with ``cpu_seconds`` of learning and
             ``success``.
         path: Path of the PNG file.
+        title: Title of the plot.
     """
     across = min(5, len(runs))
     down = -(-len(runs) // across)
-    figure, grid = plt.subplots(
-        down,
-        across,
-        figsize=(2.6 * across, 2.2 * down),
-        dpi=DPI,
-        layout="constrained",
-        squeeze=False,
-        sharey=True,
-    )
+    size = 2.1 * across + 0.4, 2.0 * down + 0.7
+    figure, grid = panels(down, across, size, share_x=True, share_y=True)
     for axes in grid.flat[len(runs) :]:
         axes.set_visible(False)
     for axes, (name, seeds) in zip(grid.flat, runs.items(), strict=False):
@@ -80,19 +80,23 @@ def plot_seed_curves(
         cpu = np.mean(
             [[float(row["cpu_seconds"]) for row in rows[:length]] for rows in seeds], 0
         )
-        plot_iqm(axes, cpu, share, INK)
-        axes.axhline(0.95, color=INKS[0], linestyle=":", linewidth=1)
-        axes.set(title=name.replace("_", " "), ylim=(-0.03, 1.03), xlim=(0, None))
-        tidy(axes, legend=None)
-    figure.supxlabel("CPU-seconds of learning, without evaluations")
-    figure.supylabel("success")
-    save(figure, path)
+        label = f"success of {TARGET}"
+        axes.axhline(TARGET, color=SOFT, linestyle=":", linewidth=1.2, label=label)
+        plot_iqm(axes, cpu, share, series(0), BAND)
+        axes.set_title(f"{name.replace('_', ' ')}, n = {len(seeds)}", fontsize="small")
+        axes.set(ylim=(-0.03, 1.03), xscale="log")
+        axes.xaxis.set_major_formatter("{x:g}")
+    middle = grid[-1, (across - 1) // 2]
+    middle.set_xlabel("CPU-seconds of learning, without evaluations")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("success")
+    save(figure, path, title)
 
 
-def plot_iqm(axes: Axes, x: Array, runs: Array, ink: str, label: str = "") -> None:
+def plot_iqm(axes: Axes, x: Array, runs: Array, look: Series, label: str = "") -> None:
     """Plot the interquartile mean of runs (runs, points) and its 95 % interval."""
     points = np.asarray(runs).T
     middle = [iqm(point) for point in points]
     low, high = np.transpose([bootstrap(point, resamples=400) for point in points])
-    axes.fill_between(x, low, high, color=ink, alpha=0.18, linewidth=0)
-    axes.plot(x, middle, color=ink, label=label)
+    axes.fill_between(x, low, high, color=look.colour, alpha=0.18, linewidth=0)
+    axes.plot(x, middle, markersize=3, label=label, **look.style)

@@ -5,16 +5,16 @@ from __future__ import annotations
 import textwrap
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 
-from marl_airhockey.play.measures import Player
+from marl_airhockey.evaluation.stats import FEWEST_GROUPS
 from marl_airhockey.play.report import Report
-from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.sim.render.charts import SOFT, panels, point, save, series
 
-LINE = 0.34
-"""Height of the line of a player, inches."""
+MOST = 40
+"""Largest number of players in the plot."""
+LINE = 0.16
+"""Height of a line of text, inches."""
 NAME = 26
 """Largest number of characters in a line of a player's name."""
 PANELS = (
@@ -26,45 +26,40 @@ PANELS = (
 
 
 def plot_report(report: Report, path: Path) -> None:
-    """Write a PNG with a line for each player.
+    """Write a PNG with a line for each of the players with the most games.
 
     The plot shows the score with its 95 % interval, and medians and quartiles of round
     trips and of speed and placement of shots.
     """
-    rows = report.rows()[::-1]
-    players = [report.players[row["player"]] for row in rows]
-    figure, grid = plt.subplots(
-        *(1, 1 + len(PANELS)),
-        figsize=(11, LINE * len(rows) + 1.3),
-        dpi=DPI,
-        layout="constrained",
-        sharey=True,
-    )
-    for k, (row, player) in enumerate(zip(rows, players, strict=True)):
+    every = report.rows()
+    rows = every[:MOST][::-1]
+    names = [
+        f"{textwrap.fill(row['player'], NAME)}\nn = {row['games']} games"
+        for row in rows
+    ]
+    lines = 1 + max((name.count("\n") for name in names), default=1)
+    size = 11, (lines * LINE + 0.1) * len(rows) + 1.6
+    figure, (grid,) = panels(1, 1 + len(PANELS), size, share_y=True)
+    for k, row in enumerate(rows):
+        player, look = report.players[row["player"]], series(0 if row["person"] else 1)
+        label = "person" if row["person"] else "driver"
         if player.games:
-            _line(grid[0], k, player, *row["score"])
+            score, *ends = row["score"]
+            point(grid[0], k, score, ends, look, label)
         for axes, (name, _) in zip(grid[1:], PANELS, strict=True):
             values = getattr(player, name)
             if len(values):
                 low, middle, high = np.quantile(values, (0.25, 0.5, 0.75))
-                _line(axes, k, player, middle, low, high)
-    names = [textwrap.fill(row["player"], NAME) for row in rows]
-    grid[0].set_yticks(range(len(rows)), names)
-    grid[0].axvline(0.5, color=INKS[0], linestyle=":", linewidth=1)
-    grid[0].set(xlim=(-0.02, 1.02), xlabel="score: win + draw / 2\n(95 % interval)")
+                point(axes, k, middle, (low, high), look, label)
+    grid[0].set_yticks(range(len(rows)), names, fontsize="small")
+    grid[0].axvline(0.5, color=SOFT, linestyle=":", linewidth=1)
+    scale = f"score: win + draw / 2\n(95 % interval from n = {FEWEST_GROUPS})"
+    grid[0].set(xlim=(-0.02, 1.02), ylim=(-0.6, len(rows) - 0.4), xlabel=scale)
     for axes, (name, label) in zip(grid[1:], PANELS, strict=True):
         axes.set_xlabel(f"{label}\n(median, quartiles)")
-        if not any(len(getattr(player, name)) for player in players):
+        if not any(len(getattr(report.players[row["player"]], name)) for row in rows):
             axes.text(0.5, 0.5, "none", transform=axes.transAxes, ha="center")
-    for axes in grid:
-        tidy(axes, legend=None)
-    save(figure, path)
-
-
-def _line(
-    axes: Axes, k: int, player: Player, middle: float, low: float, high: float
-) -> None:
-    """Plot a value and its range in the line of a player."""
-    ink = INK if player.person else INKS[0]
-    axes.plot([low, high], [k, k], color=ink, linewidth=2)
-    axes.plot(middle, k, "o", color=ink)
+    shown = f"{len(rows)} of {len(every)} players" + (
+        ", those with the most games" if len(rows) < len(every) else ""
+    )
+    save(figure, path, f"{report.episodes} episodes; {shown}")

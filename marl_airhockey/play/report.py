@@ -103,7 +103,7 @@ class Report:
             "elo": ratings.get(p.name, [NAN] * 3),
             "hit_rate": share([group.interceptions for group in groups]),
             "shots": len(p.shot_speeds),
-            "shot_speed": middle([group.shot_speeds for group in groups], iqm),
+            "shot_speed": _mean_speed([group.shot_speeds for group in groups]),
             "shot_spread": float(np.std(p.shot_placements or NAN)),
             "limited": p.limited / p.steps if p.steps else NAN,
             "round_trip_ms": iqm(np.array(p.delays)) if p.delays else NAN,
@@ -193,6 +193,15 @@ def _split(groups: list[list[Any]]) -> list[list[Any]]:
 
 def _merged(players: list[Player]) -> list[Player]:
     return [reduce(add, group) for group in _split([[p] for p in players])]
+
+
+def _mean_speed(groups: Sequence[Sequence[float]]) -> list[float]:
+    """Return the interquartile mean of speeds, m/s, with its 95 % interval.
+
+    The interval is that of the logarithm, so that it has no negative speeds.
+    """
+    found = middle(groups, lambda speeds: np.log(iqm(speeds)))
+    return [float(np.exp(value)) for value in found]
 
 
 def share(groups: Sequence[Sequence[float]]) -> list[float]:

@@ -90,39 +90,24 @@ def pretraining_config(scenario: str, profile: str, seed: int) -> PPOConfig:
 
 def plot_transfer(rows: Sequence[EvaluationResult], path: Path) -> None:
     """Plot success by policy: a panel for each profile, a colour for each backend."""
-    import matplotlib.pyplot as plt
-
-    from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
+    from marl_airhockey.sim.render.charts import panels, point, save, series
 
     profiles = list(dict.fromkeys(row.profile for row in rows))
     backends = list(dict.fromkeys(row.backend for row in rows))
-    policies = list(dict.fromkeys(row.driver for row in rows))[::-1]
-    figure, grid = plt.subplots(
-        1,
-        len(profiles),
-        figsize=(4.2 * len(profiles) + 1, 0.7 * len(policies) + 1.6),
-        dpi=DPI,
-        layout="constrained",
-        sharey=True,
-        squeeze=False,
-    )
-    for axes, profile in zip(grid[0], profiles, strict=True):
-        for k, (backend, ink) in enumerate(zip(backends, (INK, *INKS), strict=False)):
+    policies = list(dict.fromkeys(row.driver for row in rows))
+    size = 4.2 * len(profiles) + 1, 0.7 * len(policies) + 1.9
+    figure, (grid,) = panels(1, len(profiles), size, share_y=True)
+    for axes, profile in zip(grid, profiles, strict=True):
+        for row in (row for row in rows if row.profile == profile):
+            k = backends.index(row.backend)
             offset = 0.16 * (k - (len(backends) - 1) / 2)
-            mine = [r for r in rows if (r.profile, r.backend) == (profile, backend)]
-            heights = [policies.index(row.driver) - offset for row in mine]
-            axes.hlines(
-                heights,
-                *zip(*(r.success_interval for r in mine), strict=True),
-                color=ink,
-            )
-            axes.plot([r.success for r in mine], heights, "o", color=ink, label=backend)
+            height = policies.index(row.driver) + offset
+            label = f"{row.backend}, n = {row.episodes} episodes"
+            point(axes, height, row.success, row.success_interval, series(k), label)
         axes.set_yticks(range(len(policies)), policies)
         axes.set(
             xlim=(-0.03, 1.03),
-            ylim=(-0.6, len(policies) - 0.4),
-            xlabel=f"success, {profile} profile (95 %)",
+            ylim=(len(policies) - 0.4, -0.6),
+            xlabel=f"success, {profile} profile (95 % interval)",
         )
-        tidy(axes, legend=None)
-    grid[0, 0].legend(frameon=False, loc="best")
-    save(figure, path)
+    save(figure, path, "Success by policy and backend")

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
-import matplotlib.pyplot as plt
 import numpy as np
 import typer
 from rich.console import Console
@@ -28,7 +27,7 @@ from marl_airhockey.sim.core.parameters import PARAMETERS
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.seat import make_seat
 from marl_airhockey.sim.core.table import TABLES
-from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.sim.render.charts import SOFT, panels, save, series
 
 Steps = Callable[[], tuple[float, int]]
 """Function that makes some steps and returns the CPU-seconds and the number of
@@ -110,23 +109,33 @@ def seconds_per_call(step: Steps, seconds: float) -> float:
     return spent / calls
 
 
-def plot_costs(costs: dict[tuple[str, str], dict[int, float]], out: Path) -> None:
+def plot_costs(
+    costs: dict[tuple[str, str], dict[int, tuple[float, float, float]]],
+    out: Path,
+    rounds: int,
+) -> None:
     """Plot one panel for each number that grows.
 
     Args:
-        costs: CPU time of a step of a world, ns, by number, by panel and case.
+        costs: CPU time of a step of a world, ns: median, least and most of the rounds,
+            by number, by panel and case.
         out: PNG file.
+        rounds: Number of rounds.
     """
-    figure, grid = plt.subplots(2, 2, figsize=(8.4, 6.2), dpi=DPI, layout="constrained")
-    panels = dict.fromkeys(name for name, _ in costs)
-    for axes, panel in zip(grid.flat, panels, strict=True):
+    figure, grid = panels(2, 2, (8.4, 6.6))
+    names = dict.fromkeys(name for name, _ in costs)
+    for axes, panel in zip(grid.flat, names, strict=True):
         lines = {case: rows for (name, case), rows in costs.items() if name == panel}
-        for (case, rows), ink in zip(lines.items(), (INK, INKS[-1]), strict=False):
-            axes.plot(
-                *zip(*rows.items(), strict=True), "o-", ms=4, color=ink, label=case
+        for k, (case, rows) in enumerate(lines.items()):
+            look, (middle, low, high) = series(k), np.transpose(list(rows.values()))
+            axes.errorbar(
+                *(list(rows), middle, (middle - low, high - middle)),
+                markersize=4,
+                label=case,
+                **look.style,
             )
         rows = next(iter(lines.values()))
-        numbers, times = np.array(list(rows)), list(rows.values())
+        numbers, times = np.array(list(rows)), [middle for middle, *_ in rows.values()]
         straight, label = times[0] * numbers, "linear from the first"
         what, unit = "Physics alone", "world-step"
         axes.set_xlabel(f"{panel} in a world")
@@ -139,10 +148,10 @@ def plot_costs(costs: dict[tuple[str, str], dict[int, float]], out: Path) -> Non
                 straight = times[0] + (times[1] - times[0]) / numbers[1] * numbers
                 label = "linear from the first two"
             axes.set_ylim(0, None)
-        axes.plot(numbers, straight, ":", color=INKS[0], label=label)
+        axes.plot(numbers, straight, ":", color=SOFT, label=label)
         axes.set(ylabel=f"CPU, ns per {unit}", title=f"{what}, by {panel}")
-        tidy(axes)
-    save(figure, out)
+        axes.legend(frameon=False, fontsize="small")
+    save(figure, out, f"Median and range of n = {rounds} rounds", legend=False)
 
 
 def main(
@@ -166,13 +175,17 @@ def main(
         for key, n in found:
             found[key, n][round_] = seconds_per_call(cases[key][n], seconds / rounds)
     table = Table("against", "case", "number", "us per call", "ns per world-step")
-    costs: dict[tuple[str, str], dict[int, float]] = {key: {} for key in cases}
+    costs: dict[tuple[str, str], dict[int, tuple[float, float, float]]] = {
+        key: {} for key in cases
+    }
     for (key, n), times in found.items():
         call, worlds = float(np.median(times)), n if key[0] == "worlds" else BATCH
-        costs[key][n] = call / worlds * 1e9
-        table.add_row(*key, f"{n}", f"{call * 1e6:,.1f}", f"{costs[key][n]:,.0f}")
+        each = (call, times.min(), times.max())
+        middle, low, high = (float(time / worlds * 1e9) for time in each)
+        costs[key][n] = middle, low, high
+        table.add_row(*key, f"{n}", f"{call * 1e6:,.1f}", f"{costs[key][n][0]:,.0f}")
     Console().print(table)
-    plot_costs(costs, out)
+    plot_costs(costs, out, rounds)
 
 
 if __name__ == "__main__":

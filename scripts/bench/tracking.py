@@ -17,17 +17,14 @@ import time
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-import matplotlib as mpl
 import numpy as np
 import typer
 
 from marl_airhockey.hardware.lab.emulated_robot import EmulatedRobot
 from marl_airhockey.hardware.lab.lab import Lab
 from marl_airhockey.hardware.robot import FILTERS, Robot, RobotConfig, Smoothing
+from marl_airhockey.sim.render.charts import SOFT, panels, save, series
 from marl_airhockey.types import Array
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 
 SPEED, RADIUS = 0.7, 0.12
 CONTROL_DT = 0.05
@@ -131,19 +128,17 @@ def draw(record: Record, latency: float, file: Path) -> None:
     reference = reference_of(record, times)
     late = reference_of(record, times - latency)
     t = times[some] - times[some][0]
-    figure, (left, right) = plt.subplots(
-        1, 2, figsize=(10, 3.6), layout="constrained", width_ratios=(2.2, 1)
-    )
-    left.plot(t, 1e3 * reference[some, 1], color="0.6", label="path of the commands")
-    left.plot(t, 1e3 * paddle[some, 1], color="tab:blue", label="paddle")
+    figure, ((left, right),) = panels(1, 2, (10, 4.2), widths=(2.2, 1))
+    look, path = series(0), {"color": SOFT, "linestyle": "--"}
+    left.plot(t, 1e3 * reference[some, 1], label="path of the commands", **path)
+    left.plot(t, 1e3 * paddle[some, 1], color=look.colour, label="paddle")
     left.set(xlabel="time, s", ylabel="y, mm")
-    left.legend(loc="upper right")
-    right.plot(*1e3 * (late[some] - late[some].mean(0)).T, color="0.6")
-    right.plot(*1e3 * (paddle[some] - late[some].mean(0)).T, color="tab:blue")
+    right.plot(*1e3 * (late[some] - late[some].mean(0)).T, **path)
+    right.plot(*1e3 * (paddle[some] - late[some].mean(0)).T, color=look.colour)
     right.set(xlabel="x, mm", ylabel="y, mm", aspect="equal")
-    right.set_title(f"the path {1e3 * latency:.0f} ms late", fontsize=10)
-    figure.savefig(file, dpi=110)
-    plt.close(figure)
+    right.set_title(f"the path {1e3 * latency:.0f} ms late")
+    title = f"Two seconds of a circle at {SPEED} m/s, in real time, without a filter"
+    save(figure, file, title)
 
 
 def main(

@@ -17,7 +17,6 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Annotated
 
-import matplotlib.pyplot as plt
 import numpy as np
 import typer
 from rich.console import Console
@@ -27,14 +26,14 @@ from marl_airhockey.cli.league import SCRIPTS
 from marl_airhockey.evaluation.crossplay import crossplay
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.learn.plots import plot_iqm
+from marl_airhockey.learn.plots import BAND, plot_iqm
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.self_play_config import OPPONENTS
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.contracts.driver import Driver
-from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.sim.render.charts import panels, save, series
 from marl_airhockey.sim.world.keywords import Keywords
 
 COOPERATIVE = ("rally", "team_juggle")
@@ -116,19 +115,20 @@ def plot_curves(game: str, folders: Sequence[Path], path: Path) -> None:
             runs.append(list(csv.DictReader(file)))
     length = min(map(len, runs))
     names = [key for key in runs[0][0] if key.startswith("score/")]
-    figure, axes = plt.subplots(figsize=(7.2, 4.2), dpi=DPI, layout="constrained")
+    figure, grid = panels(size=(7.2, 4.6))
+    axes = grid[0, 0]
     cpu = np.mean([[float(r["cpu_seconds"]) for r in x[:length]] for x in runs], 0) / 60
-    for name, ink in zip(names, (*INKS, INK), strict=False):
+    for k, name in enumerate(names):
         share = np.array([[float(r[name]) for r in x[:length]] for x in runs])
-        plot_iqm(axes, cpu, share, ink, name.partition("/")[2])
+        plot_iqm(axes, cpu, share, series(k), f"against {name.partition('/')[2]}")
     axes.set(
         xlabel="CPU-minutes of training",
         ylabel="score: win + draw / 2",
         ylim=(-0.03, 1.03),
-        title=game.replace("_", " "),
+        xlim=(0, None),
     )
-    tidy(axes)
-    save(figure, path)
+    many = f"{BAND}, n = {len(runs)}" if len(runs) > 1 else "n = 1 seed, no interval"
+    save(figure, path, f"{game.replace('_', ' ')}\n{many}")
 
 
 def main(

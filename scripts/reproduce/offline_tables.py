@@ -21,6 +21,7 @@ import typer
 
 from marl_airhockey.data.benchmark.content import published
 from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.sim.render.charts import SOFT, panels, point, save, series
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
 """Folder of the committed rows."""
@@ -56,6 +57,13 @@ PAPER: dict[str, dict[str, Paper]] = {
 }
 """Success of BC, IQL and RL in the paper, by domain and task; None without a figure."""
 PAPER["paper"] = PAPER["2d"]
+TITLES = {
+    "2d": "The ten tasks; the paper's figures have other rules and physics",
+    "robosuite": "Six tasks on the arm in MuJoCo",
+    "lab": "Five tasks in the virtual lab",
+    "paper": "The ten tasks by the rules of the paper's code",
+}
+"""Titles of plots by domain."""
 COLUMNS = {"2d": ("success", 2000), "robosuite": ("arm", 200)}
 """Column of ``tasks.csv`` with the success of RL, and the number of episodes per
 seed."""
@@ -149,33 +157,51 @@ def tables_of(rows: list[Row]) -> dict[str, list[list[str]]]:
     }
 
 
-def plot(rows: list[Row], path: Path, domain: str) -> None:
-    """Plot our success as bars, the paper's as marks, and chance as lines."""
-    import matplotlib.pyplot as plt
+def seeds_of(domain: str, algo: str, rows: list[Row]) -> str:
+    """Return the number of seeds of an algorithm in a task as text."""
+    cell = {"domain": domain, "tier": EXPERT, "algo": algo}
+    if algo == "rl" and domain == "lab":
+        return "1 seed"
+    if algo == "rl" and domain in COLUMNS:
+        rows, cell = read("tasks.csv"), {"profile": "ideal", "variant": ""}
+    own = [r["task"] for r in rows if all(r[name] == cell[name] for name in cell)]
+    counts = [own.count(task) for task in PAPER[domain]]
+    few, many = min(counts), max(counts)
+    return f"{few} seed{'s' * (few > 1)}" if few == many else f"{few} to {many} seeds"
 
-    tasks, width = list(PAPER[domain]), 0.26
-    figure, axes = plt.subplots(figsize=(10, 3.6), layout="constrained")
+
+def plot(rows: list[Row], path: Path, domain: str) -> None:
+    """Plot our success with intervals, the paper's figures, and chance."""
+    tasks = list(PAPER[domain])
+    figure, grid = panels(size=(9, 0.5 * len(tasks) + 1.7))
+    axes = grid[0, 0]
     for k, name in enumerate(("bc", "iql", "rl")):
-        ours = [
-            rl_of(domain, task, rows)
-            if name == "rl"
-            else success_of(rows, domain, EXPERT, task, name)
-            for task in tasks
-        ]
-        at = np.arange(len(tasks)) + (k - 1) * width
-        heights = [found[0] if found else 0.0 for found in ours]
-        axes.bar(at, heights, 0.9 * width, label=f"{name.upper()}, ours")
-        theirs = [PAPER[domain][task][k] or 0.0 for task in tasks]
-        label = "the paper" if k == 2 else "_"
-        axes.plot(at, theirs, "k_", markersize=11, markeredgewidth=2, label=label)
-    for k, task in enumerate(tasks):
+        look, shift = series(k), 0.24 * (k - 1)
+        label = f"{name.upper()}, {seeds_of(domain, name, rows)}"
+        for height, task in enumerate(tasks):
+            found = (
+                rl_of(domain, task, rows)
+                if name == "rl"
+                else success_of(rows, domain, EXPERT, task, name)
+            )
+            if found is not None:
+                point(axes, height + shift, found[0], interval(*found), look, label)
+            paper = PAPER[domain][task][k]
+            if paper is not None:
+                axes.plot(
+                    *([paper], [height + shift], look.marker),
+                    color=look.colour,
+                    markerfacecolor="none",
+                    markersize=9,
+                    label=f"{name.upper()}, the paper",
+                )
+    for height, task in enumerate(tasks):
         chance = chance_of(domain, task, rows)
-        label = "chance" if k == 0 else "_"
-        axes.hlines(chance, k - 0.45, k + 0.45, "grey", "dotted", label=label)
-    axes.set_xticks(range(len(tasks)), [t.replace("_", "\n") for t in tasks])
-    axes.set_ylabel("success")
-    axes.legend(ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
-    figure.savefig(path, dpi=120)
+        axes.plot([chance], [height], "x", color=SOFT, label="chance")
+    axes.set_yticks(range(len(tasks)), [task.replace("_", " ") for task in tasks])
+    axes.set(ylim=(len(tasks) - 0.5, -0.6), xlim=(-0.03, 1.03))
+    axes.set_xlabel("success; bars are 95 % intervals over episodes")
+    save(figure, path, TITLES[domain])
 
 
 def main(

@@ -150,7 +150,9 @@ def main(
         markdown.write_text("\n".join(map(markdown_of, tables.values())))
     if curves is not None:
         points = read(DATA / "curves.csv")
-        plot_seed_curves({t: curves_of(points, t, profile) for t in TASKS}, curves)
+        title = f"PPO in the profile {profile}, without selection of checkpoints"
+        runs = {task: curves_of(points, task, profile) for task in TASKS}
+        plot_seed_curves(runs, curves, title)
 
 
 if __name__ == "__main__":

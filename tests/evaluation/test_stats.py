@@ -10,6 +10,8 @@ from marl_airhockey.evaluation.stats import (
     bounded_mean,
     elo,
     iqm,
+    over_tasks,
+    performance_profile,
     probability_of_improvement,
     without_nan,
 )
@@ -35,6 +37,20 @@ def test_statistics_of_runs():
     assert probability_of_improvement([1, 2], [1, 2]) == 0.5
     with pytest.raises(ValueError, match="no values"):
         iqm(np.array([]))
+
+
+def test_statistics_over_tasks_weight_tasks_equally():
+    runs = [np.array([0.0, 0.2]), np.array([1.0, 1.0, 0.7])]
+    value, low, high = over_tasks(runs, lambda values: values.mean())
+    assert value == pytest.approx((0.1 + 0.9) / 2)
+    # No resample leaves its task.
+    assert 0.35 <= low < value < high <= 0.6
+    same = [np.full(3, 0.5), np.full(5, 0.9)]
+    assert over_tasks(same, iqm) == pytest.approx((0.7, 0.7, 0.7))
+    levels = np.array([0.0, 0.5, 0.95])
+    profile, *ends = over_tasks(same, lambda x: performance_profile(x, levels))
+    assert profile.tolist() == [1.0, 0.5, 0.0]
+    assert np.array_equal(ends, [profile, profile])
 
 
 def test_runs_are_summed_up_over_runs_and_over_episodes():

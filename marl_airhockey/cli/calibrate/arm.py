@@ -94,22 +94,20 @@ def _in_words(trials: Sequence[ArmTrial]) -> str:
 def _plot(trials: Sequence[ArmTrial], values: dict[str, Any], path: Path) -> None:
     """Write a PNG with the measured gain and phase and those of the model."""
     require("matplotlib", "train")
-    import matplotlib.pyplot as plt
-
-    from marl_airhockey.sim.render.charts import DPI, INK, save, tidy
+    from marl_airhockey.sim.render.charts import panels, save, series
 
     f = np.linspace(0.5, 5.0, 200)
     # Both poles of a critically damped lag are at this frequency.
     angle = 2 * np.pi * f * values["servo_time"]["mean"] / HALF
     phase = -2 * np.arctan(angle) - 2 * np.pi * f * values["action_delay"]["mean"]
     model = (1 / (1 + angle**2), np.degrees(phase))
-    figure, panels = plt.subplots(1, 2, figsize=(7, 2.8), dpi=DPI, layout="constrained")
+    figure, (grid,) = panels(1, 2, (7, 3.2))
     seen = _response(trials)
     labels = ("gain", "phase, degrees")
-    for k, (axes, curve, label) in enumerate(zip(panels, model, labels, strict=True)):
-        axes.plot(f, curve, color=INK, label="dead time and lag")
-        axes.plot(seen.keys(), [row[k] for row in seen.values()], "o", label="chirps")
+    name = f"measured, mean of n = {sum(bool(t.response) for t in trials)} chirps"
+    for k, (axes, curve, label) in enumerate(zip(grid, model, labels, strict=True)):
+        axes.plot(f, curve, color=series(0).colour, label="dead time and lag, fitted")
+        points = [row[k] for row in seen.values()]
+        axes.plot(seen.keys(), points, "s", color=series(1).colour, label=name)
         axes.set(xlabel="frequency, Hz", ylabel=label)
-        tidy(axes, None)
-    panels[0].legend(frameon=False)
-    save(figure, path)
+    save(figure, path, "Response of the arm")

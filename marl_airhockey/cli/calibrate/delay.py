@@ -65,15 +65,15 @@ def delay(
 def _plot(found: Delays, path: Path) -> None:
     """Write a PNG with the histograms of the delays."""
     require("matplotlib", "train")
-    import matplotlib.pyplot as plt
+    from marl_airhockey.sim.render.charts import panels, save, series
 
-    from marl_airhockey.sim.render.charts import DPI, INK, save, tidy
-
-    figure, panels = plt.subplots(1, 3, figsize=(9, 2.8), dpi=DPI, layout="constrained")
+    figure, (grid,) = panels(1, 3, (9, 3.2))
     parts = (found.camera, found.arm, found.round_trip)
-    for axes, name, values in zip(panels, NAMES, parts, strict=True):
-        axes.hist(1e3 * np.asarray(values), bins=24, color=INK)
-        axes.set(xlabel=f"{name}, ms")
-        tidy(axes, None)
-    panels[0].set_ylabel("trials")
-    save(figure, path)
+    for k, (axes, name, values) in enumerate(zip(grid, NAMES, parts, strict=True)):
+        axes.hist(1e3 * np.asarray(values), bins=24, color=series(0).colour)
+        mean, sd = 1e3 * np.mean(values), 1e3 * np.std(values)
+        style = {"color": series(1).colour, "linestyle": "--"}
+        axes.axvline(mean, label="mean" if k == 0 else "", **style)
+        axes.set(xlabel=f"{name}, ms", title=f"{mean:.1f} ms, sd {sd:.1f} ms")
+    grid[0].set_ylabel("trials")
+    save(figure, path, f"Delays, n = {len(found.camera)} trials")
