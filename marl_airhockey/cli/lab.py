@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from marl_airhockey.cli import play as cli_play
+from marl_airhockey.cli import hosting
 from marl_airhockey.cli.environment import TableOptions
 from marl_airhockey.cli.options import console
 from marl_airhockey.cli.progress import waiting
@@ -50,9 +50,9 @@ def open_lab(
             help="Show a trained policy that juggles, on a page in the browser.",
         ),
     ] = False,
-    host: cli_play.Host = "127.0.0.1",
-    port: cli_play.Port = 8480,
-    browser: cli_play.Browser = True,
+    host: hosting.Host = "127.0.0.1",
+    port: hosting.Port = 8480,
+    browser: hosting.Browser = True,
 ) -> None:
     """Run the virtual lab until Ctrl+C."""
     if context.invoked_subcommand is not None:
@@ -95,14 +95,16 @@ def show_demo(host: str, port: int, browser: bool) -> None:
     with environment.table(environment.keywords) as table:
         match = RealMatch(GAME, {"paddle_0": environment.on_table(PLAYER)}, table)
         match.again = True
-        cli_play.host_match(match, None, host, port, browser)
+        hosting.host_match(match, None, host, port, browser)
 
 
 @lab.command()
 def fault(
     name: Annotated[
         str | None,
-        typer.Argument(help="Name of a fault; by default all faults are listed."),
+        typer.Argument(
+            help="Name of a fault; by default all are listed, and those that are on."
+        ),
     ] = None,
     off: Annotated[
         bool, typer.Option("--off", help="Switch the fault off instead of on.")
@@ -111,11 +113,14 @@ def fault(
     """Switch a fault of the running lab on or off."""
     from marl_airhockey.hardware.lab.lab import LabClient
 
-    if name is None:
-        for known, words in FAULTS.items():
-            console.print(f"{known:18} {words}")
-        return
     client = LabClient.find()
+    if name is None:
+        on = client.ask("faults")["on"] if client else []
+        for known, words in FAULTS.items():
+            console.print(f"{known:18} {words}{' (on)' if known in on else ''}")
+        if client:
+            client.close()
+        return
     if client is None:
         raise RuntimeError("lab: no lab is running; start one with airhockey lab")
     client.ask("fault", name=name, on=not off)

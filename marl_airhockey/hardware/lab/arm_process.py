@@ -15,7 +15,7 @@ from marl_airhockey.hardware.block import Block
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.priority import raise_priority
 from marl_airhockey.hardware.ur_emulator.controller import Controller
-from marl_airhockey.hardware.ur_emulator.faults import FAULTS
+from marl_airhockey.hardware.ur_emulator.faults import FAULTS, faults_of
 from marl_airhockey.hardware.ur_emulator.motions import Line
 from marl_airhockey.hardware.ur_emulator.plant import EmptyTable, PlantReading
 from marl_airhockey.hardware.ur_emulator.ports import Ports
@@ -56,6 +56,7 @@ def run_arm(setup: LabSetup, memory: Any, pipe: Connection) -> None:
 
     orders: dict[str, Callable[[Any], None]] = {
         "guide": guide,
+        "report": lambda _: None,
         **{name: partial(fault.switch, controller) for name, fault in FAULTS.items()},
     }
 
@@ -70,7 +71,13 @@ def run_arm(setup: LabSetup, memory: Any, pipe: Connection) -> None:
                 ended.set()
                 return
             orders[name](value)
-            pipe.send({"stopped": arm.stopped, "safety": arm.safety.name})
+            pipe.send(
+                {
+                    "stopped": arm.stopped,
+                    "safety": arm.safety.name,
+                    "faults": faults_of(controller),
+                }
+            )
 
         ports = asyncio.create_task(served.serve())
         while not ports.done() and not controller.ticks:

@@ -64,7 +64,7 @@ def open_door(answer: Answer, file: Path | None = None) -> Iterator[int]:
 
 
 class DoorClient:
-    """Client of an RPC server.
+    """Client of an RPC server, also for several threads.
 
     Args:
         port: Port of the server.
@@ -79,6 +79,7 @@ class DoorClient:
         self._socket = socket.create_connection(("127.0.0.1", port), 2.0)
         self._socket.settimeout(WAIT)
         self._file = self._socket.makefile("rwb")
+        self._lock = threading.Lock()
 
     def ask(self, do: str, **order: Any) -> dict[str, Any]:
         """Send a request and return the response.
@@ -86,9 +87,10 @@ class DoorClient:
         Raises:
             RuntimeError: The service rejects the request or has ended.
         """
-        self._file.write(json.dumps({"do": do, **order}).encode() + b"\n")
-        self._file.flush()
-        line = self._file.readline()
+        with self._lock:
+            self._file.write(json.dumps({"do": do, **order}).encode() + b"\n")
+            self._file.flush()
+            line = self._file.readline()
         answer = json.loads(line) if line else {"error": "the service has ended"}
         if "error" in answer:
             raise RuntimeError(f"{self._name}: {answer['error']}")

@@ -92,6 +92,9 @@ class Lab:
     def ask(self, order: dict[str, Any]) -> dict[str, Any]:
         """Execute a request of a client and return the response.
 
+        The response to {"do": "faults"} is {"on": NAMES}, the faults that the lab has
+        now. A protective stop that was unlocked is not one of them.
+
         Raises:
             ValueError: The request or the fault is unknown, or the path is invalid.
             RuntimeError: A process does not respond.
@@ -109,6 +112,11 @@ class Lab:
             if what == "fault" and order["name"] in ARM_FAULTS:
                 self._arm.send((order["name"], bool(order["on"])))
                 return self._expect(self._arm)
+            if what == "faults":
+                self._arm.send(("report", None))
+                names = self._expect(self._arm)["faults"]
+                self._table.send({"do": "truth"})
+                return {"on": [*names, *self._expect(self._table)["faults"]]}
             if what == "guide":
                 self._arm.send(("guide", order["place"]))
                 return self._expect(self._arm)

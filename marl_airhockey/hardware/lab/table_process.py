@@ -71,6 +71,8 @@ class TableLoop:
             "stuck_frame": self._stick,
             "lost_puck": self._remove_puck,
         }
+        self._on: set[str] = set()
+        """Names of the faults that are switched on."""
 
     def _freeze(self, on: bool) -> None:
         self._frozen = on
@@ -136,12 +138,15 @@ class TableLoop:
         if what == "place":
             position, velocity = np.array(order["puck"]), np.array(order["velocity"])
             world.put(position, velocity, held=True)
+            self._on.discard("lost_puck")
         elif what == "release":
             world.release()
         elif what == "board":
             self._camera.show_board(order["number"])
         elif what == "fault":
-            self.faults[order["name"]](bool(order["on"]))
+            name, on = order["name"], bool(order["on"])
+            self.faults[name](on)
+            self._on = self._on | {name} if on else self._on - {name}
         since = self._now - world.time
         return {
             "time": self._now,
@@ -150,6 +155,7 @@ class TableLoop:
             "paddle": self._paddle_state,
             "puck": world.puck.tolist(),
             "velocity": world.puck_velocity.tolist(),
+            "faults": sorted(self._on),
             "laws": {name: float(value[0]) for name, value in world.laws.items()},
         }
 
