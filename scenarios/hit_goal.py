@@ -122,5 +122,10 @@ class HitGoal(FewShots, GoalScenario):
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         return [Mark.circle(memory["goal"], self.radius)]
 
+    def caption(self, memory: Memory) -> str:
+        if np.isinf(memory["near"]):
+            return "not struck yet"
+        return f"closest {100 * memory['near']:.0f} of {100 * self.radius:.0f} cm"
+
 
 make = HitGoal

@@ -110,5 +110,8 @@ class Juggle(Scenario):
         armed = memory["struck_at"][memory["armed"] > 0]
         return [Mark.across(self.table_geometry, x + self.lift) for x in armed]
 
+    def caption(self, memory: Memory) -> str:
+        return f"hits {memory['hits']:.0f} of {self.hits}"
+
 
 make = Juggle

@@ -150,5 +150,8 @@ class MoveBlock(FewShots):
         moved = length(t.after.block[..., 0, :] - t.before.block[..., 0, :]) > least
         return np.asarray(moved & (t.after.time > 0.25))
 
+    def caption(self, memory: Memory) -> str:
+        return f"block moved {100 * memory['moved']:.1f} of {100 * self.way:.0f} cm"
+
 
 make = MoveBlock

@@ -74,5 +74,8 @@ class PuckVelocity(FallingPuck):
         high = t.after.puck[..., 0, 0] > 0.5
         return np.asarray(high & (t.after.time > 1.25))
 
+    def caption(self, memory: Memory) -> str:
+        return f"speed {max(memory['rise'], 0.0):.2f} of {self.fast:.2f} m/s"
+
 
 make = PuckVelocity

@@ -130,5 +130,8 @@ class Rally(Scenario):
         """(...) bool: There have been ``crossings`` counted crossings."""
         return np.asarray(t.new_memory["crossings"] >= self.crossings)
 
+    def caption(self, memory: Memory) -> str:
+        return f"crossings {memory['crossings']:.0f} of {self.crossings}"
+
 
 make = Rally

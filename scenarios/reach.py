@@ -138,5 +138,8 @@ class Reach(GoalScenario):
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         return [Mark.circle(memory["goal"], self.radius)]
 
+    def caption(self, memory: Memory) -> str:
+        return f"distance {100 * memory['gap']:.1f} of {100 * self.radius:.0f} cm"
+
 
 make = Reach

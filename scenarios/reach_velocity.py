@@ -164,5 +164,8 @@ class ReachVelocity(GoalScenario):
         goal, velocity = memory["goal"], memory["goal_velocity"]
         return [Mark.circle(goal, self.radius), Mark.arrow(goal, 0.2 * velocity)]
 
+    def caption(self, memory: Memory) -> str:
+        return f"best match {100 * memory['score']:.0f} %"
+
 
 make = ReachVelocity

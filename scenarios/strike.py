@@ -109,5 +109,8 @@ class Strike(Scenario):
         """(...) bool: The puck is faster than 0.2 m/s."""
         return np.asarray(length(t.after.puck_velocity[..., 0, :]) > 0.2)
 
+    def caption(self, memory: Memory) -> str:
+        return f"speed {memory['speed']:.2f} of {self.fast:.2f} m/s"
+
 
 make = Strike

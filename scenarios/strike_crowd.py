@@ -140,5 +140,10 @@ class StrikeCrowd(Scenario):
         tenth = 0.1 * np.hypot(*self.table_geometry.size)
         return np.asarray((spread > tenth) & (t.after.time > 0.15))
 
+    def caption(self, memory: Memory) -> str:
+        return (
+            f"blocks moved {100 * memory['spread']:.1f} of {100 * self.spread:.0f} cm"
+        )
+
 
 make = StrikeCrowd

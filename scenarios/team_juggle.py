@@ -136,5 +136,8 @@ class TeamJuggle(Scenario):
         armed = memory["struck_at"][memory["armed"] > 0]
         return [Mark.across(self.table_geometry, x + self.lift) for x in armed]
 
+    def caption(self, memory: Memory) -> str:
+        return f"passes {memory['passes']:.0f} of {self.passes}"
+
 
 make = TeamJuggle
