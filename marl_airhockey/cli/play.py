@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import socket
-import threading
-import webbrowser
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,33 +12,20 @@ from marl_airhockey.cli.environment import (
     as_trained_unless_given,
     in_environment,
 )
+from marl_airhockey.cli.hosting import Browser, Host, Port, host_match
 from marl_airhockey.cli.options import console, settings
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.play.handicap import BOUNDS, Handicap
 from marl_airhockey.play.ladder import RUNGS, USUAL, usual_level
-from marl_airhockey.registry import REAL, make_driver
+from marl_airhockey.registry import REAL, make_driver, scenario_names
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.world.keywords import Keywords
 
 if TYPE_CHECKING:
-    from starlette.applications import Starlette
-
-    from marl_airhockey.play.access import AccessCheck
     from marl_airhockey.play.live_match import LiveMatch
-    from marl_airhockey.play.open_table import Plant
 
-Host = Annotated[
-    str,
-    typer.Option(
-        help="Network address of the page; 0.0.0.0 serves it on all networks, with an "
-        "access token in the printed link."
-    ),
-]
-Port = Annotated[
-    int,
-    typer.Option(help="Port of the page; 0 selects a free port.", min=0, max=65535),
-]
-Browser = Annotated[bool, typer.Option(help="Open the page in the browser.")]
+FIRST = "duel"
+"""Game of a page on which players choose."""
 Reaction = Annotated[
     float | None,
     typer.Option(
@@ -73,8 +55,14 @@ Pace = Annotated[
 
 @in_environment
 def play(
-    scenario: Annotated[str, typer.Argument(help="Name of a scenario.")],
     environment: EnvironmentOptions,
+    scenario: Annotated[
+        str | None,
+        typer.Argument(
+            help="Name of a scenario; without it, players choose among all games and "
+            "tasks on the page."
+        ),
+    ] = None,
     opponent: Annotated[
         str | None,
         typer.Option(
@@ -110,24 +98,34 @@ def play(
     """
     require("starlette", "play")
     require("uvicorn", "play")
+    from marl_airhockey.play.game_menu import GameMenu
     from marl_airhockey.play.live_match import LiveMatch
     from marl_airhockey.play.real_match import RealMatch
 
     kind = RealMatch if environment.backend == REAL else LiveMatch
-    keywords, seats = environment.keywords, settings(environment.driver)
+    seats = settings(environment.driver)
+    limits = {"reaction": reaction, "noise": noise, "pace": pace}
+    handicap = Handicap(**{k: v for k, v in limits.items() if v is not None})
+
+    def prepare(name: str, keywords: Keywords) -> LiveMatch:
+        match = kind(name, {}, keywords, handicap)
+        seat_drivers(match, opponent, seats)
+        match.warm_up()
+        return match
+
+    keywords = environment.keywords
     keywords.pop("drivers", None)
     keywords.setdefault("control_dt", kind.CONTROL_DT)
-    keywords = _as_trained(scenario, {opponent, *seats.values()}, keywords)
-    limits = {"reaction": reaction, "noise": noise, "pace": pace}
-    given = {name: value for name, value in limits.items() if value is not None}
+    if scenario is not None:
+        keywords = _as_trained(scenario, {opponent, *seats.values()}, keywords)
+    names = scenario_names() if scenario is None and kind is LiveMatch else []
+    menu = GameMenu(names, lambda name: prepare(name, keywords))
     with environment.table(keywords) as table:
-        match = kind(scenario, {}, table, Handicap(**given))
-        seat_drivers(match, opponent, seats)
         with waiting("preparing the table (the first time takes longer)"):
-            match.warm_up()
+            match = prepare(scenario or FIRST, table)
         if record:
             console.print(f"recordings: {record}, at most {keep} of this table")
-        host_match(match, record, host, port, browser, keep=keep)
+        host_match(match, record, host, port, browser, keep=keep, menu=menu)
 
 
 def _as_trained(scenario: str, names: set[str | None], given: Keywords) -> Keywords:
@@ -140,75 +138,6 @@ def _as_trained(scenario: str, names: set[str | None], given: Keywords) -> Keywo
     _, keywords, _ = as_trained_unless_given(players, scenario, given)
     keywords.pop("drivers", None)  # `seat_drivers` sets the driver of every seat.
     return keywords
-
-
-def host_match(
-    match: LiveMatch,
-    record: Path | None,
-    host: str,
-    port: int,
-    browser: bool,
-    film: bool = False,
-    keep: int | None = None,
-) -> None:
-    """Serve a match until interrupted; in the virtual lab, with buttons for its faults.
-
-    Args:
-        match: Match to serve.
-        record: Folder of the recordings; None to record nothing.
-        host: Network address of the page.
-        port: Port of the page; 0 for a free one.
-        browser: True to open the page.
-        film: True to record the video of a real table's camera.
-        keep: Largest number of recordings of this table; None for no limit.
-    """
-    from marl_airhockey.play.open_table import open_table
-    from marl_airhockey.play.real_match import RealMatch
-    from marl_airhockey.play.recorder import Recorder
-    from marl_airhockey.play.server import application
-
-    filmed = match.backend.camera if film and isinstance(match, RealMatch) else None
-    recorder = Recorder(record, filmed, keep) if record else None
-    with contextlib.ExitStack() as stack:
-        plant = None
-        if isinstance(match, RealMatch):
-            plant = stack.enter_context(lab_plant(match.backend.rig.operator))
-        session = open_table(match, recorder, plant)
-        name = match.world.scenario.name
-        # Only the virtual lab has faults that can be switched.
-        guarded = plant is not None and not plant.faults
-        host_table(
-            lambda access: application(session, access),
-            *(name, host, port, browser),
-            guarded=guarded,
-        )
-    if session.failure is not None:
-        raise session.failure
-
-
-@contextlib.contextmanager
-def lab_plant(operator: str) -> Iterator[Plant]:
-    """Yield the faults of the virtual lab, or no faults for another table.
-
-    Args:
-        operator: Operator of the table, see `rig.Rig.operator`.
-    """
-    from marl_airhockey.hardware.lab.faults import FAULTS
-    from marl_airhockey.hardware.lab.lab import LabClient
-    from marl_airhockey.play.open_table import Plant
-
-    kind, _, port = operator.partition(":")
-    if kind != "lab":
-        yield Plant()
-        return
-    client = LabClient(int(port))
-
-    def switch(name: str, on: bool) -> None:
-        with contextlib.suppress(RuntimeError):
-            client.ask("fault", name=name, on=on)
-
-    yield Plant(FAULTS, switch)
-    client.close()
 
 
 def seat_drivers(match: LiveMatch, opponent: str | None, seats: dict[str, Any]) -> None:
@@ -230,66 +159,9 @@ def seat_drivers(match: LiveMatch, opponent: str | None, seats: dict[str, Any]) 
         name = chosen.pop(agent, PERSON if i == 0 else rest)
         if name not in levels:
             match.set_driver(i, name)
-        elif match.handicap == Handicap():
-            match.set_level(i, levels[name])
         else:
-            match.set_driver(i, levels[name].driver)
+            limits = None if match.handicap != Handicap() else levels[name].handicap
+            match.set_driver(i, levels[name].driver, limits)
     if chosen:
         scenario = match.world.scenario.name
         raise ValueError(f"--driver: {scenario} has no agent {', '.join(chosen)}")
-
-
-def show(recording: Path, host: str, port: int, browser: bool) -> None:
-    """Show a recording in the browser until interrupted."""
-    require("starlette", "play")
-    require("uvicorn", "play")
-    from marl_airhockey.play.server import replay
-
-    name = recording.name
-    host_table(lambda access: replay(recording, access), name, host, port, browser)
-
-
-def host_table(
-    make: Callable[[AccessCheck], Starlette],
-    what: str,
-    host: str,
-    port: int,
-    browser: bool,
-    guarded: bool = False,
-) -> None:
-    """Serve an application until interrupted, after printing its address.
-
-    Args:
-        make: Function that builds the application.
-        what: Name of the application, for the printed line.
-        host: Network address of the page.
-        port: Port of the page; 0 for a free one.
-        browser: True to open the page.
-        guarded: True if local pages need the token, too; see `AccessCheck`.
-    """
-    from marl_airhockey.play.access import AccessCheck
-    from marl_airhockey.play.connections import listen, serve
-
-    access = AccessCheck(host, guarded)
-    app = make(access)
-    server = listen(host, port)
-    address = f"http://{_reachable(host)}:{server.getsockname()[1]}/"
-    if access.token:
-        address += f"?token={access.token}"
-    console.print(f"{what} is at {address} (Ctrl-C stops it)", soft_wrap=True)
-    if browser:
-        threading.Timer(0.5, webbrowser.open, [address]).start()
-    serve(app, server)
-
-
-def _reachable(host: str) -> str:
-    """Return the host as a part of an address that other machines can open."""
-    if host == "0.0.0.0":
-        with (
-            contextlib.suppress(OSError),
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe,
-        ):
-            # This sends nothing. It only selects the local address of the route.
-            probe.connect(("192.0.2.1", 9))
-            return str(probe.getsockname()[0])
-    return f"[{host}]" if ":" in host else host

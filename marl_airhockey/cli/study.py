@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from marl_airhockey.cli.hosting import Browser, Host, Port, host_table
 from marl_airhockey.cli.options import console
-from marl_airhockey.cli.play import Browser, Host, Port, host_table
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.sim.core.errors import require
 

@@ -10,8 +10,9 @@ from typing import Annotated, Literal
 
 import typer
 
-from marl_airhockey.cli import play as cli_play
+from marl_airhockey.cli import hosting
 from marl_airhockey.cli.environment import TableOptions, in_environment
+from marl_airhockey.cli.play import seat_drivers
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.registry import REAL
 from marl_airhockey.sim.core.errors import require
@@ -48,9 +49,9 @@ def teleop(
             "else allround."
         ),
     ] = None,
-    host: cli_play.Host = "127.0.0.1",
-    port: cli_play.Port = 8480,
-    browser: cli_play.Browser = True,
+    host: hosting.Host = "127.0.0.1",
+    port: hosting.Port = 8480,
+    browser: hosting.Browser = True,
 ) -> None:
     """Teleoperate the paddle of a real or simulated table, and record it.
 
@@ -78,10 +79,10 @@ def teleop(
         leader = (
             f"shadow:rig={path},prescribe={str(not real).lower()}" if path else PERSON
         )
-        cli_play.seat_drivers(match, opponent, {"paddle_0": leader})
+        seat_drivers(match, opponent, {"paddle_0": leader})
         with waiting("preparing the table (the first time takes longer)"):
             match.warm_up()
-        cli_play.host_match(match, out, host, port, browser, film)
+        hosting.host_match(match, out, host, port, browser, film)
 
 
 @contextmanager

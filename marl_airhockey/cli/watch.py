@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from marl_airhockey.cli import play as cli_play
+from marl_airhockey.cli import hosting
 from marl_airhockey.cli.environment import EnvironmentOptions, in_environment
 from marl_airhockey.cli.options import Scenario, console
 from marl_airhockey.data.files import is_recording
@@ -39,9 +39,9 @@ def watch(
             "birdview; on a real table also table or rectified."
         ),
     ] = "top",
-    host: cli_play.Host = "127.0.0.1",
-    port: cli_play.Port = 0,
-    browser: cli_play.Browser = True,
+    host: hosting.Host = "127.0.0.1",
+    port: hosting.Port = 0,
+    browser: hosting.Browser = True,
 ) -> None:
     """Show episodes of a driver, or a recording, or write a video of them.
 
@@ -52,7 +52,7 @@ def watch(
 
     if is_recording(Path(name)):
         if video is None:
-            cli_play.show(Path(name), host, port, browser)
+            hosting.show(Path(name), host, port, browser)
         else:
             watch_recording(Path(name), video)
         return

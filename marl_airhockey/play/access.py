@@ -46,6 +46,8 @@ class AccessCheck:
         self.local = host in LOOPBACK
         needed = guarded or not self.local
         self.token = secrets.token_urlsafe(12) if needed else ""
+        self.link = ""
+        """Address of the page with the token."""
 
     def is_remote(self, request: HTTPConnection) -> bool:
         """Return False only for a request of a page on this machine without a proxy.

@@ -36,9 +36,13 @@ class Client:
         """Last aim, table frame, m."""
         self.device: dict[str, Any] = {}
         """Fields of the message ``device``, see `protocol.MESSAGES`."""
+        self.wants_insight = False
+        """True if the page shows what a driver observes."""
         self.limiter = RateLimiter(self.last_input)
         self.frame = ""
         """Newest message to send; it replaces a message that was not sent in time."""
+        self.events: list[list[Any]] = []
+        """Events since the last frame that was sent, see `LiveMatch.events`."""
         self.frame_number = 0
         """Number of the newest message."""
         self.frame_ready = asyncio.Event()

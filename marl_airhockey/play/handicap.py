@@ -25,6 +25,11 @@ OWN_PACE = 0.05
 """Time between two decisions of a driver without a `control_dt`, s."""
 
 
+SEEN = "handicap.seen"
+"""Name of the memory with the observed pucks: positions and velocities (W, pucks, 4),
+ego frame, m and m/s."""
+
+
 @dataclass(frozen=True)
 class Handicap:
     """Limits of a driver; the defaults are no limits.
@@ -110,6 +115,8 @@ class HandicappedDriver(Driver):
             seen, own = self.perceive(view, own)
             read = view.read
             view = replace(view, state=seen, read=lambda _: read(seen))
+        pucks = view.state.puck, view.state.puck_velocity
+        own[SEEN] = np.concatenate(pucks, axis=-1)
         action, rest = self.inner.act(view, rest)
         norm = np.maximum(np.hypot(action[:, 0], action[:, 1]), 1e-9)
         action = action * np.minimum(self.handicap.pace / norm, 1.0)[:, None]

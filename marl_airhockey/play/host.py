@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from marl_airhockey.play.client import Client
 from marl_airhockey.play.live_match import LiveMatch
@@ -19,6 +19,20 @@ Handler = Callable[..., None]
 """Function of a page and the fields of its message."""
 
 
+class Images(Protocol):
+    """Images of a match, which are made next to the loop of ticks."""
+
+    @property
+    def failure(self) -> str:
+        """Reason why there are no more images; "" if there are."""
+
+    def offer(self, match: LiveMatch) -> None:
+        """Take the state of a match for the next image."""
+
+    def newest(self, after: int) -> tuple[int, bytes] | None:
+        """Return number and JPEG of the next image; None if there is none in time."""
+
+
 class Host(ABC):
     """Host of a session.
 
@@ -30,6 +44,10 @@ class Host(ABC):
         self.seats = seats
         self.edition = 0
         """Number of changes of the JSON that `describe` returns."""
+        self.scene: Images | None = None
+        """Images of the 3D scene; None without simulated arms."""
+        self.invitation: dict[str, Any] | None = None
+        """Link and code by which other people open the page; None without a network."""
 
     @property
     def match(self) -> LiveMatch:
@@ -76,6 +94,10 @@ class Host(ABC):
     def after_tick(self) -> None:
         """Update the host after a tick of the match."""
         return None
+
+    def close(self) -> None:
+        """Close the match when the server stops."""
+        self.match.close()
 
     @abstractmethod
     def check_presence(self, now: float) -> None:

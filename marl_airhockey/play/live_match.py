@@ -9,9 +9,9 @@ import numpy as np
 
 from marl_airhockey.build import build_world
 from marl_airhockey.play.handicap import Handicap
-from marl_airhockey.play.ladder import Level, usual_level
 from marl_airhockey.play.match_drivers import MatchDrivers
 from marl_airhockey.play.messages import description, drawn, events
+from marl_airhockey.play.tally import Tally
 from marl_airhockey.rollouts.columns import first_columns
 from marl_airhockey.sim.contracts.observable import OBSERVE
 from marl_airhockey.sim.core.recording import Columns
@@ -19,6 +19,7 @@ from marl_airhockey.sim.core.seat import Seat
 from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.sim.world.world import World
+from marl_airhockey.types import Memory
 
 RATE = 60
 """Number of ticks and of control steps per second."""
@@ -26,7 +27,9 @@ COUNTDOWN = 3.0
 """Time from the start of a match to its first step, s."""
 RESUME = 1.5
 """Shortest countdown after a pause, s."""
-Phase = Literal["lobby", "arrange", "countdown", "play", "pause", "done"]
+RETRY = 0.8
+"""Countdown of another try of a task, s."""
+Phase = Literal["lobby", "arrange", "countdown", "play", "goal", "pause", "done"]
 
 
 class LiveMatch:
@@ -78,17 +81,22 @@ class LiveMatch:
         self.pauses = 0
         """Number of pauses of this episode."""
         self.time_left = 0.0
-        """Rest of a countdown, s."""
+        """Rest of a countdown, or of the stop after a goal, s."""
+        self.goal_stop = 0.0
+        """Time for which play stops after a goal, so that pages can show it again, s;
+        0 to continue."""
+        self.mixed = False
+        """True if a driver has changed during this episode."""
         self.reason = ""
         """Cause of a pause or of an abortion; "" for none."""
         self.events: list[list[Any]] = []
         """Rows ["goal", goal line, puck] and ["hit", paddle, puck] of the last tick."""
         self.result: StepResult | None = None
         """Result of the last control step of this episode; None before the first."""
+        self.tally = Tally(len(self.seats))
+        """Hits, shots and streaks of this episode."""
         self.first: Columns = {}
         """Columns (1, ...) of a recording before the first step of this episode."""
-        table = self.world.scene.table
-        self._rotations = [table.rotation(seat.side) for seat in self.seats]
         self.world.seed(seed)
         self._next_episode()
         for agent, name in drivers.items():
@@ -101,8 +109,12 @@ class LiveMatch:
 
     @property
     def _decided_by(self) -> str:
-        memory = {name: value[0] for name, value in self.world.memory.items()}
-        return self.world.scenario.decided_by(memory)
+        return self.world.scenario.decided_by(self._memory)
+
+    @property
+    def _memory(self) -> Memory:
+        """Memory of the scenario, without the batch axis."""
+        return {name: value[0] for name, value in self.world.memory.items()}
 
     @property
     def winners(self) -> list[int]:
@@ -129,23 +141,15 @@ class LiveMatch:
         else:
             self.drivers.reset([i])
 
-    def set_level(self, i: int, level: Level) -> None:
-        """Set a level of the ladder as the driver of a seat, between matches.
-
-        Raises:
-            ValueError: A match is running, or the driver does not fit.
-        """
-        self.set_driver(i, level.driver, level.handicap)
-
-    def substitute(self, i: int) -> None:
-        """Set the default level of the ladder as a driver, even in a match.
+    def replace_driver(self, i: int, name: str, handicap: Handicap) -> None:
+        """Set the driver of a seat, even in a match.
 
         Raises:
             ValueError: The driver does not fit.
         """
-        level = usual_level(self.drivers.ladder)
-        self.drivers.set(i, level.driver, level.handicap)
+        self.drivers.set(i, name, handicap)
         self.drivers.reset([i])
+        self.mixed = self.ticks > 0
 
     def clear(self) -> None:
         """End a running match, and return to the lobby with the normal rules."""
@@ -154,11 +158,6 @@ class LiveMatch:
             self._use(self._rules)
             self._next_episode()
             self.phase, self.reason = "lobby", ""
-
-    def to_ego(self, i: int, x: float, y: float) -> tuple[float, float]:
-        """Rotate a vector from the table frame into the ego frame of a seat."""
-        rotated = self._rotations[i] @ np.array([x, y])
-        return float(rotated[0]), float(rotated[1])
 
     def warm_up(self) -> None:
         """Play half a second and reset, so that all loops are compiled."""
@@ -169,14 +168,18 @@ class LiveMatch:
         self._next_episode()
 
     def start(self) -> None:
-        """Start a match, or resume a paused one, with a countdown."""
+        """Start a match or resume a paused one with a countdown; end a stop."""
         if self.phase == "pause":
             self.phase, self.time_left = "countdown", max(self.time_left, RESUME)
+        elif self.phase == "goal":
+            self.phase, self.time_left = "play", 0.0
         elif self.phase in ("lobby", "done"):
             self._use(self._rules)
-            if self.phase == "done":
+            again = self.phase == "done"
+            if again:
                 self._next_episode()
-            self.phase, self.time_left = "countdown", COUNTDOWN
+            is_retry = again and len(self.seats) == 1
+            self.phase, self.time_left = "countdown", RETRY if is_retry else COUNTDOWN
         self.reason = ""
 
     @property
@@ -212,25 +215,28 @@ class LiveMatch:
 
     def pause(self, reason: str = "") -> None:
         """Pause a running match."""
-        if self.phase in ("play", "countdown"):
+        if self.phase in ("play", "countdown", "goal"):
             self.phase, self.reason = "pause", reason
             self.pauses += 1
 
     def abort(self, reason: str) -> None:
         """End a match early, without a winner."""
-        if self.phase in ("play", "countdown", "pause"):
+        if self.phase in ("play", "countdown", "goal", "pause"):
             self.phase, self.reason = "done", reason
 
     def tick(self) -> bool:
         """Advance the clock by 1 / `RATE` s; return True if the world was stepped."""
         self.events = []
-        if self.phase == "countdown":
+        if self.phase in ("countdown", "goal"):
             self.time_left -= 1 / RATE
             if self.time_left <= 1e-9:
                 self.phase, self.time_left = "play", 0.0
         if self.phase != "play":
             return False
         self._step()
+        scored = any(kind == "goal" for kind, *_ in self.events)
+        if self.phase == "play" and scored and self.goal_stop:
+            self.phase, self.time_left = "goal", self.goal_stop
         return True
 
     def close(self) -> None:
@@ -244,26 +250,21 @@ class LiveMatch:
         ``n`` counts the steps of the episode. ``time_left`` is the rest of a countdown,
         s.
         """
+        world, episode = self.world, self.world.episode
+        state = world.state.map(lambda x: x[0])
+        shown = episode.returns[0], episode.success[0]
         return {
             "phase": self.phase,
             "n": self.ticks,
             "time_left": round(self.time_left, 2),
-            **self._drawn(),
+            **drawn(world.scenario, state, self._memory, *shown),
             "reason": self.reason,
             "golden_goal": self.keywords != self._rules,
             "offers_golden_goal": self.offers_golden_goal,
             "events": self.events,
+            "tally": self.tally.state() if self.phase == "done" else None,
+            "mixed": self.mixed,
         }
-
-    def _drawn(self) -> dict[str, Any]:
-        world, episode = self.world, self.world.episode
-        return drawn(
-            world.scenario,
-            world.state.map(lambda x: x[0]),
-            {name: value[0] for name, value in world.memory.items()},
-            episode.returns[0],
-            episode.success[0],
-        )
 
     def describe(self) -> dict[str, Any]:
         """Return the constant data of a match: `messages.description`."""
@@ -278,6 +279,7 @@ class LiveMatch:
     def _begin_episode(self) -> None:
         """Reset counters and drivers after a reset of the world."""
         self.ticks, self.pauses, self.result, self.events = 0, 0, None, []
+        self.mixed, self.tally = False, Tally(len(self.seats))
         self.number += 1
         self.drivers.reset(range(len(self.seats)))
         self.first = first_columns(self.world)
@@ -290,6 +292,8 @@ class LiveMatch:
             actions[:, i] = self.drivers.action(i)
         self.result = world.step(actions, self.drivers.prescribed())
         self.ticks += 1
-        self.events = events(world.state.map(lambda x: x[0]))
+        state = world.state.map(lambda x: x[0])
+        self.events = events(state)
+        self.tally.note(world.scenario, state, self._memory)
         if self.result.terminated[0] or self.result.truncated[0]:
             self.phase, self.reason = "done", ""

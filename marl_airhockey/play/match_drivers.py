@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from marl_airhockey.build import refuse_erratic
-from marl_airhockey.play.handicap import Handicap, HandicappedDriver
+from marl_airhockey.play.handicap import SEEN, Handicap, HandicappedDriver
 from marl_airhockey.play.ladder import Level, ladder_of
 from marl_airhockey.policies.load import ZOO, policy_file
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
@@ -75,6 +76,19 @@ class MatchDrivers:
             hashlib.sha256(file.read_bytes()).hexdigest()[:16] if file.is_file() else ""
             for file in files
         ]
+
+    @cached_property
+    def best_policy(self) -> dict[str, Any] | None:
+        """Facts about the best fitting policy of the zoo; None without one.
+
+        ``success`` is its success rate in a task, or None. ``minutes`` is the CPU time
+        of its training.
+        """
+        if not self.fitting_policies:
+            return None
+        card = NumpyPolicy.load(policy_file(self.fitting_policies[0])).card
+        success = card.get("grades", {}).get("success")
+        return {"success": success, "minutes": card.get("cpu_minutes")}
 
     @cached_property
     def fitting_policies(self) -> list[str]:
@@ -151,6 +165,19 @@ class MatchDrivers:
         if not self._driven[i].acts:
             return np.zeros((1, 2))
         return self._driven[i].act(self._world.known)
+
+    def observed(self, i: int) -> Array | None:
+        """Return the pucks that a driver observed last: positions and velocities.
+
+        The rows are (pucks, 4), table frame, m and m/s. It is None for a person, and
+        before the first action.
+        """
+        seen = self._driven[i].memory.get(SEEN)
+        if seen is None:
+            return None
+        scene = self._world.scene
+        rotation = scene.table.rotation(scene.seats[i].side)
+        return np.hstack([seen[0, :, :2] @ rotation, seen[0, :, 2:] @ rotation])
 
     def prescribed(self) -> Array | None:
         """Return measured position and velocity of paddles (1, seats, 4), ego frame.

@@ -5,33 +5,34 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from typing import Any
 
 from marl_airhockey.play.client import Client
+from marl_airhockey.play.demonstration import Demonstration
+from marl_airhockey.play.game_menu import GameMenu
 from marl_airhockey.play.host import GONE, GRACE, Handler, Host
+from marl_airhockey.play.insight import checkpoints, observed
+from marl_airhockey.play.ladder import usual_level
 from marl_airhockey.play.live_match import LiveMatch
 from marl_airhockey.play.match_drivers import PERSON
+from marl_airhockey.play.plant import Plant
 from marl_airhockey.play.real_match import RealMatch
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.seats import Seats
 from marl_airhockey.play.session import Session
 from marl_airhockey.play.visitors import Visitors
 
-
-@dataclass(frozen=True)
-class Plant:
-    """Emulated devices of a table, whose faults can be switched on and off."""
-
-    faults: Mapping[str, str] = field(default_factory=dict)
-    """Descriptions of the faults, by name."""
-    switch: Callable[[str, bool], None] = lambda name, on: None
-    """Function that switches a fault on or off."""
+GOAL_STOP = 3.6
+"""Time for which play stops after a goal, s: pages show the goal for 0.6 s, then the
+last 1.5 s at half speed."""
 
 
 def open_table(
-    match: LiveMatch, recorder: Recorder | None = None, plant: Plant | None = None
+    match: LiveMatch,
+    recorder: Recorder | None = None,
+    plant: Plant | None = None,
+    menu: GameMenu | None = None,
 ) -> Session:
     """Return a session in which every page can take a free seat.
 
@@ -39,8 +40,10 @@ def open_table(
         match: Match of the session.
         recorder: Recorder of the episodes; None to record nothing.
         plant: Devices of a virtual lab, whose faults pages may switch.
+        menu: Games among which players choose; None for the match only.
     """
-    return Session(OpenTable(Seats(match), recorder, plant or Plant()))
+    table = OpenTable(Seats(match), recorder, plant or Plant(), menu or GameMenu())
+    return Session(table)
 
 
 class OpenTable(Host):
@@ -50,11 +53,15 @@ class OpenTable(Host):
         seats: Seats of the match.
         recorder: Recorder of the episodes; None to record nothing.
         plant: Devices whose faults pages may switch.
+        menu: Games among which players choose.
     """
 
-    def __init__(self, seats: Seats, recorder: Recorder | None, plant: Plant) -> None:
+    def __init__(
+        self, seats: Seats, recorder: Recorder | None, plant: Plant, menu: GameMenu
+    ) -> None:
         super().__init__(seats)
-        self._recorder, self.plant = recorder, plant
+        self._recorder, self.plant, self.menu = recorder, plant, menu
+        self._demonstration = Demonstration()
         self.visitors = Visitors(seats)
         self._handlers: dict[str, Handler] = {
             "hello": self._hello,
@@ -70,6 +77,10 @@ class OpenTable(Host):
             "leave": self._leave,
             "opponent": self._opponent,
             "join": self._join,
+            "game": self._game,
+            "insight": self._insight,
+            "checkpoint": self._checkpoint,
+            "lobby": self._lobby,
             "fault": self._fault,
         }
 
@@ -82,12 +93,63 @@ class OpenTable(Host):
         return self._recorder
 
     def describe(self) -> dict[str, Any]:
+        ladder = self.match.drivers.ladder
         return {
             **self.match.describe(),
-            "ladder": [level.name for level in self.match.drivers.ladder],
+            "games": self.menu.rows,
+            "ladder": [level.name for level in ladder],
+            "usual": usual_level(ladder).name,
+            "policy": self.match.drivers.best_policy,
+            "checkpoints": checkpoints(self.match),
+            "invite": self.invitation,
+            "scene": self.scene is not None,
             "camera": isinstance(self.match, RealMatch),
             "faults": dict(self.plant.faults),
         }
+
+    def status(self) -> dict[str, Any]:
+        state: dict[str, Any] = {"opening": self.menu.opening}
+        if self.match.phase == "lobby":
+            state["demo"] = self._demonstration.state()
+        if any(client.wants_insight for client in self.seats.clients):
+            state["insight"] = observed(self.match)
+        if self.scene is not None:
+            state["scene"] = self.scene.failure
+        if self.plant.faults:
+            state["faults"] = list(self.plant.active())
+        return state
+
+    def after_tick(self) -> None:
+        """Play a demonstration in the lobby; open a chosen game that is prepared."""
+        if self.scene is not None:
+            self.scene.offer(self.match)
+        prepared = self.menu.take()
+        if prepared is not None:
+            self._open(prepared)
+        is_lobby = self.match.phase == "lobby" and self.seats.clients
+        if is_lobby and not isinstance(self.match, RealMatch):
+            self._demonstration.tick(self.match)
+
+    def _open(self, match: LiveMatch) -> None:
+        """Replace the match by that of another game; players keep their seats."""
+        self.clear_table("another game was chosen")
+        self.match.close()
+        self._demonstration.end()
+        match.goal_stop = self.match.goal_stop
+        self.seats.match = match
+        self.visitors.forget()
+        self.edition += 1
+        people = [i for i, name in enumerate(match.drivers.names) if name == PERSON]
+        for client in self.seats.clients:
+            if client.seat is not None and client.seat not in people:
+                client.seat = None
+                self.visitors.wait(client)
+        self._seat_waiting(time.monotonic())
+
+    def close(self) -> None:
+        self.menu.close()
+        self._demonstration.end()
+        super().close()
 
     def own_fields(self, client: Client) -> dict[str, Any]:
         return {"queue": self.visitors.position(client)}
@@ -158,10 +220,33 @@ class OpenTable(Host):
         """Set drivers for the seats that people have left, and continue the match."""
         if client.seat is None or self.match.phase != "pause":
             return
+        level = usual_level(self.match.drivers.ladder)
         for seat in self.seats.free:
-            self.match.substitute(seat)
+            self.match.replace_driver(seat, level.driver, level.handicap)
         self.visitors.forget()
         self.match.start()
+
+    def _insight(self, client: Client, on: int) -> None:
+        """Start or stop to send what a driver observes to a page."""
+        client.wants_insight = bool(on)
+
+    def _checkpoint(self, client: Client, seat: int, name: str) -> None:
+        """Replace a driver by another stage of its training, even in a match."""
+        drivers = self.match.drivers
+        stages = [row["name"] for row in checkpoints(self.match)]
+        is_policy = seat < len(drivers.names) and drivers.names[seat] != PERSON
+        if self.seats.may_control(client) and name in stages and is_policy:
+            self.match.replace_driver(seat, name, drivers.handicaps[seat])
+
+    def _game(self, client: Client, name: str) -> None:
+        """Choose another game of the menu, between matches."""
+        if self.seats.may_control(client) and self._between_matches:
+            self.menu.choose(name)
+
+    def _lobby(self, client: Client) -> None:
+        """Return from a result to the start screen."""
+        if self.seats.may_control(client) and self.match.phase == "done":
+            self.match.clear()
 
     def _golden_goal(self, client: Client) -> None:
         if self.seats.may_control(client) and not self.seats.free:
@@ -207,7 +292,7 @@ class OpenTable(Host):
             if level.name == name:
                 # Levels fit; a match on a real table rejects limited observations.
                 with contextlib.suppress(ValueError):
-                    self.match.set_level(seat, level)
+                    self.match.set_driver(seat, level.driver, level.handicap)
 
     def _fault(self, client: Client, name: str, on: int) -> None:
         if self.seats.may_control(client) and name in self.plant.faults:

@@ -84,6 +84,7 @@ def frames_of(episode: Episode, scenario: Scenario) -> list[dict[str, Any]]:
         notes = {
             **{"phase": "play", "n": n, "time_left": 0.0, "reason": ""},
             **{"golden_goal": False, "offers_golden_goal": False},
+            **{"tally": None, "mixed": False},
         }
         frames.append({**notes, **row, "events": events(state) if n else []})
     return frames

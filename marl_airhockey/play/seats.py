@@ -112,7 +112,7 @@ class Seats:
         if held:
             client.last_held = time.monotonic()
         if held or not isinstance(self.match, RealMatch):
-            mouse.aim(*self.match.to_ego(client.seat, x, y))
+            mouse.aim(*self._to_ego(client.seat, x, y))
         else:
             mouse.rest()
         if (x, y) != client.pointer:
@@ -127,11 +127,17 @@ class Seats:
         if client.seat is None:
             return
         gamepad: Any = self.match.drivers.input_device(client.seat, "gamepad")
-        gamepad.push(*self.match.to_ego(client.seat, x, y))
+        gamepad.push(*self._to_ego(client.seat, x, y))
         client.last_held = time.monotonic()
         if (x, y) != (0.0, 0.0):
             client.last_input = time.monotonic()
         client.acknowledged, client.round_trip = q, rtt if rtt > 0.0 else None
+
+    def _to_ego(self, i: int, x: float, y: float) -> tuple[float, float]:
+        """Rotate a vector from the table frame into the ego frame of a seat."""
+        rotation = self.match.world.scene.table.rotation(self.match.seats[i].side)
+        rotated = rotation @ np.array([x, y])
+        return float(rotated[0]), float(rotated[1])
 
     def rest_unheld(self, now: float) -> None:
         """Stop paddles whose pointer is released, or whose page is silent."""

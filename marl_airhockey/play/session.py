@@ -17,6 +17,8 @@ from marl_airhockey.sim.core.recording import PLAYED
 
 BEHIND = 6
 """Largest number of ticks that a delayed loop catches up; others are skipped."""
+EVENTS = 20
+"""Largest number of events of a frame."""
 ASIDE = 0.1
 """Time after which pages receive a frame while a real table is not ready, s."""
 
@@ -147,10 +149,17 @@ class Session:
         status = {**self._status(), **self.host.status()}
         self._frames += 1
         shared = {"t": "state", "f": self._frames, **self.match.state(), **status}
+        events = shared.pop("events")
         text = json.dumps(shared, separators=(",", ":"))[:-1]
         for client in self.clients:
+            client.events = [*client.events, *events][-EVENTS:]
             link = {"rate": client.link.rate, "ms": round(1e3 * client.link.delay)}
-            fields = {"seat": client.seat, "ack": client.acknowledged, "link": link}
+            fields = {
+                "seat": client.seat,
+                "ack": client.acknowledged,
+                "link": link,
+                "events": client.events,
+            }
             own = {**fields, **self.host.own_fields(client)}
             client.frame = f"{text},{json.dumps(own, separators=(',', ':'))[1:]}"
             client.frame_number = self._frames

@@ -36,9 +36,8 @@ def running(*words):
 
 
 def page_at(browser, address, complaints, **options):
-    page = browser.new_page(
-        viewport={"width": 1000, "height": 600}, bypass_csp=True, **options
-    )
+    options = {"viewport": {"width": 1000, "height": 640}, **options}
+    page = browser.new_page(bypass_csp=True, **options)
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on(
         "console", lambda m: complaints.append(m.text) if m.type == "error" else None
@@ -46,6 +45,19 @@ def page_at(browser, address, complaints, **options):
     page.goto(address)
     page.wait_for_function("window.airhockey.frames.length > 5")
     return page
+
+
+def press(page, text):
+    """Click a button by its text, once it is there."""
+    page.get_by_role("button", name=text, exact=True).click()
+
+
+def point_of(page, x, y):
+    """The point of the window at a point of the table, px."""
+    script = (
+        "([x, y]) => airhockey.view.toScreen(x, y).map((v) => v / devicePixelRatio)"
+    )
+    return page.evaluate(script, [x, y])
 
 
 def state_of(page):

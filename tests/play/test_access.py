@@ -5,7 +5,8 @@ from starlette.requests import HTTPConnection
 
 from marl_airhockey.play.access import AccessCheck
 from marl_airhockey.play.live_match import LiveMatch
-from marl_airhockey.play.open_table import Plant, open_table
+from marl_airhockey.play.open_table import open_table
+from marl_airhockey.play.plant import Plant
 
 
 def request(peer="127.0.0.1", host="127.0.0.1:8480", query="", **headers):

@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from pages import page_at, running, served, state_of, wait
+from pages import page_at, point_of, press, running, served, state_of, wait
 from study_steps import plan_writer
 
 from marl_airhockey.play.live_match import RATE, LiveMatch
@@ -15,38 +15,31 @@ def test_a_person_plays_in_the_browser(browser):
     complaints = []
     with served("duel", "--opponent", "still", "--option", "goals_to_win=1") as (at, _):
         page = page_at(browser, at, complaints)
-        watcher = page_at(browser, at, complaints, color_scheme="dark")
         assert state_of(page)["seat"] == 0
-        assert state_of(watcher)["seat"] is None
+        page.wait_for_function("airhockey.state().demo.pucks.length === 1")
         page.keyboard.press("Space")
         wait(page, "s.phase === 'play'")
-        box = page.locator("#table").bounding_box()
-        metre = box["width"] / 1.82
-        middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-        def point(x, y):
-            page.mouse.move(middle[0] + x * metre, middle[1] - y * metre)
-
-        point(-0.5, 0.15)
+        page.mouse.move(*point_of(page, -0.5, 0.15))
         wait(page, "Math.hypot(s.paddles[0][0] + 0.5, s.paddles[0][1] - 0.15) < 0.03")
         began = time.monotonic()
         while (state := state_of(page))["phase"] == "play":
             # Get behind the puck, then through it.
             x, y = state["pucks"][0][:2]
             behind = state["paddles"][0][0] < x - 0.06
-            point(min(x, -0.06) if behind else x - 0.2, y)
+            page.mouse.move(*point_of(page, min(x, -0.06) if behind else x - 0.2, y))
             page.wait_for_timeout(16)
             assert time.monotonic() - began < 55, "no goal against nobody"
         wait(page, "s.phase === 'done'")
-        assert state["caption"].startswith("goals")
-        # The page shows a new phase with its next picture.
-        verdict = (
-            "/^You (win!|lose)$/.test(document.querySelector('#headline').innerText)"
-        )
-        page.wait_for_function(verdict)
-        assert state_of(watcher)["phase"] == "done"
-        page.locator("#go").click()
+        # The goal is shown again before the card.
+        page.locator("#moment").get_by_text("Replay").wait_for()
+        assert not page.locator("#card").is_visible()
+        page.locator("#card h1").wait_for()
+        assert page.locator("#card h1").inner_text() in ("You win!", "You lose")
+        assert "fastest shot" in page.locator("#card").inner_text()
+        press(page, "Play again")
         wait(page, "s.phase === 'play' && s.n < 60")
+        watcher = page_at(browser, at, complaints, color_scheme="dark")
+        assert state_of(watcher)["seat"] is None
         page.reload()
         page.wait_for_function("window.airhockey.frames.length > 5")
         wait(page, "s.seat === 0 && s.phase === 'play'")
@@ -56,17 +49,24 @@ def test_a_person_plays_in_the_browser(browser):
     assert not complaints
 
 
-def test_a_phone_plays_upright(browser):
+@pytest.mark.slow
+def test_a_task_is_ten_tries_on_a_phone(browser):
     complaints = []
-    with served("juggle") as (address, _):
-        page = page_at(browser, address, complaints, color_scheme="dark")
-        page.set_viewport_size({"width": 390, "height": 760})
-        page.locator("#go").click()
+    with served("juggle", "--option", "seconds=0.5") as (address, _):
+        page = page_at(
+            *(browser, address, complaints),
+            color_scheme="dark",
+            viewport={"width": 390, "height": 844},
+        )
+        press(page, "Play")
         wait(page, "s.phase === 'play'")
-        box = page.locator("#table").bounding_box()
-        x, y = box["x"] + box["width"] * 0.5, box["y"] + box["height"] * 0.8
-        page.mouse.move(x, y)
+        assert not page.locator("#foot").is_visible(), "no controls in play"
+        page.mouse.move(*point_of(page, -0.6, 0.0))
         wait(page, "Math.abs(s.paddles[0][1]) < 0.03 && s.ack > 0")
+        page.locator("#detail").get_by_text("Hits 0 of 4").wait_for()
+        page.locator("#headline").get_by_text("0 of 10").wait_for()
+        press(page, "Menu")
+        page.get_by_text("Your best today: 0.").wait_for()
         page.close()
     assert not complaints
 
@@ -112,7 +112,7 @@ def test_a_participant_in_the_browser(browser, tmp_path):
         go.click()
         for _ in range(2):
             wait(page, "s.study.stage === 'ready'")
-            page.locator("#go").click()
+            page.locator("#choices").get_by_role("button").first.click()
             wait(page, "s.phase === 'play'")
             page.keyboard.down("ArrowUp")
             wait(page, "s.paddles[0][1] > 0.1 || s.phase === 'done'")

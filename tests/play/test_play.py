@@ -176,7 +176,7 @@ def test_policies_that_fit_are_offered(game, keywords, fitting):
     match = LiveMatch(game, {}, keywords, seed=0)
     assert match.drivers.fitting_policies == fitting
     for level in match.drivers.ladder:
-        match.set_level(0, level)
+        match.set_driver(0, level.driver, level.handicap)
         assert match.drivers.level(0) == level.name
     if not fitting:
         with pytest.raises(ValueError, match="expects observations"):

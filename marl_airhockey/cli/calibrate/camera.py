@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from marl_airhockey.cli import play as cli_play
+from marl_airhockey.cli import hosting
 from marl_airhockey.cli.options import console
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.hardware.camera import Camera, open_source
@@ -79,9 +79,9 @@ def open_calibration(
         bool,
         typer.Option("--lab", help="Use the camera and the arm of the virtual lab."),
     ] = False,
-    host: cli_play.Host = "127.0.0.1",
-    port: cli_play.Port = 8490,
-    browser: cli_play.Browser = True,
+    host: hosting.Host = "127.0.0.1",
+    port: hosting.Port = 8490,
+    browser: hosting.Browser = True,
 ) -> None:
     """Calibrate a camera, a table and an arm, on a page in the browser."""
     if context.invoked_subcommand is not None:
@@ -93,7 +93,7 @@ def open_calibration(
     if hand:
         path = Path("hand.json") if out == Path("rig.json") else out
         with _hand_session(camera, _size(field), path, tags, lab) as of_hand:
-            cli_play.host_table(
+            hosting.host_table(
                 lambda access: application(of_hand, access.refusal),
                 *("calibration", host, port, browser),
             )
@@ -118,7 +118,7 @@ def open_calibration(
                 from marl_airhockey.hardware.calibration.helper import Helper
 
                 session.orders.update(Helper(client).orders)
-            cli_play.host_table(
+            hosting.host_table(
                 lambda access: application(session, access.refusal),
                 *("calibration", host, port, browser),
             )

@@ -1,18 +1,27 @@
-"use strict";
-// One's own paddle: moved here at once, by the law of the server's driver.
+// One's own paddle: moved here immediately, with the pointer controller of the server.
 
-function seatNow() { return now && now.seat !== null ? match.seats[now.seat] : null; }
+import { game, mySeat, on } from "./state.js";
 
-function correct(data) {
-  if (data.seat === null) { ownPaddle = null; return; }
-  const [x, y] = data.paddles[data.seat];
-  if (!ownPaddle || data.phase !== "play" || steered) { ownPaddle = { x, y, vx: 0, vy: 0 }; predicted = []; return; }
-  const past = predicted.find((p) => p[0] === data.ack);
-  if (!past) return;
+export const own = { paddle: null }; // predicted paddle: x, y, vx, vy
+let past = []; // [aim, x, y] of the last aims
+
+export function remember(aim) {
+  past.push([aim, own.paddle ? own.paddle.x : 0, own.paddle ? own.paddle.y : 0]);
+  if (past.length > 90) past.shift();
+}
+
+on("match", () => { own.paddle = null; past = []; });
+
+export function correct(frame, predicts) {
+  if (frame.seat === null) { own.paddle = null; return; }
+  const [x, y] = frame.paddles[frame.seat];
+  if (!own.paddle || frame.phase !== "play" || !predicts) { own.paddle = { x, y, vx: 0, vy: 0 }; past = []; return; }
+  const then = past.find((p) => p[0] === frame.ack);
+  if (!then) return;
   // The server's position belongs to the aim that it acknowledges: compare with ours of then.
-  const dx = x - past[1], dy = y - past[2], share = Math.hypot(dx, dy) > 0.15 ? 1 : 0.12;
-  ownPaddle.x += share * dx; ownPaddle.y += share * dy;
-  for (const p of predicted) { p[1] += share * dx; p[2] += share * dy; }
+  const dx = x - then[1], dy = y - then[2], share = Math.hypot(dx, dy) > 0.15 ? 1 : 0.12;
+  own.paddle.x += share * dx; own.paddle.y += share * dy;
+  for (const p of past) { p[1] += share * dx; p[2] += share * dy; }
 }
 
 function clampTo(reach, rotation, x, y) {
@@ -28,15 +37,15 @@ function clampTo(reach, rotation, x, y) {
   return [rotation[0][0] * u + rotation[1][0] * v, rotation[0][1] * u + rotation[1][1] * v];
 }
 
-function predict(dt) {
-  const seat = seatNow();
-  if (!ownPaddle || !seat || !pointer || now.phase !== "play") return;
-  const wx = pointer[0] - ownPaddle.x, wy = pointer[1] - ownPaddle.y, far = Math.max(Math.hypot(wx, wy), 1e-9);
-  const speed = Math.min(match.mouse.gain * far, Math.sqrt(2 * match.mouse.brake * seat.acceleration * far), seat.speed);
-  let ax = (wx / far) * speed - ownPaddle.vx, ay = (wy / far) * speed - ownPaddle.vy;
+export function predict(dt, pointer) {
+  const seat = mySeat(), paddle = own.paddle;
+  if (!paddle || !seat || !pointer || game.now.phase !== "play") return;
+  const { gain, brake } = game.match.mouse;
+  const wx = pointer[0] - paddle.x, wy = pointer[1] - paddle.y, far = Math.max(Math.hypot(wx, wy), 1e-9);
+  const speed = Math.min(gain * far, Math.sqrt(2 * brake * seat.acceleration * far), seat.speed);
+  let ax = (wx / far) * speed - paddle.vx, ay = (wy / far) * speed - paddle.vy;
   const most = seat.acceleration * dt, size = Math.hypot(ax, ay);
   if (size > most) { ax *= most / size; ay *= most / size; }
-  ownPaddle.vx += ax; ownPaddle.vy += ay;
-  const x = ownPaddle.x + ownPaddle.vx * dt, y = ownPaddle.y + ownPaddle.vy * dt;
-  [ownPaddle.x, ownPaddle.y] = clampTo(seat.reach, seat.rotation, x, y);
+  paddle.vx += ax; paddle.vy += ay;
+  [paddle.x, paddle.y] = clampTo(seat.reach, seat.rotation, paddle.x + paddle.vx * dt, paddle.y + paddle.vy * dt);
 }

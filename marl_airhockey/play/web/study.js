@@ -1,21 +1,21 @@
-"use strict";
 // Study: texts to agree to, questions, breaks, the end.
+
+import { lostNotice, playNotice } from "./screens.js";
+import { howTo } from "./start.js";
+import { show, hide } from "./notice.js";
+import { verdict, why } from "./result.js";
+import { $, element, game, on, put, send } from "./state.js";
 
 let sheet = ""; // key of SHEETS that covers the table
 let leaving = false; // true while the page asks for a confirmation of withdrawal
 
-const element = (tag, text = "", cls = "") => {
-  const node = document.createElement(tag);
-  node.textContent = text; node.className = cls;
-  return node;
-};
 const button = (text, act) => { const node = element("button", text, "main"); node.onclick = act; return node; };
 
 function another() { sessionStorage.removeItem("key"); location.reload(); }
 
 const SHEETS = {
   consent() {
-    const { title, information, agree, version } = match.study, go = button("Take part", () => send("consent", { version }));
+    const { title, information, agree, version } = game.match.study, go = button("Take part", () => send("consent", { version }));
     const boxes = agree.map((line) => {
       const label = element("label", "", "tick"), box = element("input");
       box.type = "checkbox"; label.append(box, line);
@@ -26,7 +26,7 @@ const SHEETS = {
     return [element("h1", title), ...information.map((text) => element("p", text)), ...boxes, go];
   },
   questions() {
-    const { questions } = match.study, go = button("Continue", sendAnswers), fields = questions.map(fieldOf);
+    const { questions } = game.match.study, go = button("Continue", sendAnswers), fields = questions.map(fieldOf);
     function fieldOf(question) {
       if (question.free) {
         const field = element("fieldset"), box = element("textarea");
@@ -59,7 +59,7 @@ const SHEETS = {
   },
   end() {
     return [
-      element("h1", "The study is complete"), element("p", match.study.thanks), ...now.study.debriefing.map((text) => element("p", text)), element("p", `Your code is ${now.study.code}. You can use it to have your data erased later.`),
+      element("h1", "The study is complete"), element("p", game.match.study.thanks), ...game.now.study.debriefing.map((text) => element("p", text)), element("p", `Your code is ${game.now.study.code}. You can use it to have your data erased later.`),
       button("Next participant", () => { send("next"); another(); }),
     ];
   },
@@ -74,15 +74,10 @@ const SHEETS = {
   },
 };
 
-function updateStudyWords() {
-  const { stage, code } = now.study, runs = now.phase === "play" || now.phase === "countdown", sits = now.seat !== null;
-  for (const name of OF_PLAYERS) $(name).hidden = true;
-  put($("pause"), runs ? "Pause" : "Start");
-  $("pause").disabled = !sits || !(stage === "match" || (stage === "ready" && !now.study.waits));
+export function updateStudy() {
+  const { match, now } = game, { stage, code } = now.study, sits = now.seat !== null;
   $("withdraw").hidden = !code;
   put($("code"), code ? `your code: ${code}` : "");
-  canvas.classList.toggle("mine", sits && now.phase === "play");
-  seats(-1);
   const wanted = leaving && code ? "leaving" : stage in SHEETS ? stage : "";
   if (wanted !== sheet) {
     sheet = wanted;
@@ -90,18 +85,21 @@ function updateStudyWords() {
     $("sheet").hidden = !wanted; $("sheet").scrollTop = 0;
     if (wanted && now.phase === "play") send("pause");
   }
-  // Who has not begun must not see what somebody else has played.
+  // A participant who has not begun must not see what somebody else has played.
   document.body.classList.toggle("covered", Boolean(wanted));
-  if (wanted) { $("notice").hidden = true; return; }
-  const { block, game, games, time_left, waits } = now.study, where = block < 0 ? "Practice" : `Part ${block + 1} of ${match.study.blocks}`;
-  if (down) show("No connection", refused || "trying again…", "");
-  else if (stage === "busy") show("A session is running", "Please wait until it is over.", "");
-  else if (stage === "partner" && now.phase !== "play" && now.phase !== "countdown" && now.phase !== "pause") show("Please wait", "You play in some parts of this session. Thank you for taking part.", "");
-  else if (stage === "partner" && !sits) show("Please wait", "You play in another part of this session.", "");
-  else if (stage === "rest") show("A break", `${where} begins in ${time_left} s.`, "");
-  else if (stage === "over") show(verdict(), why(), "");
-  else if (stage === "ready" && waits) show(where, "Waiting for the other player.", "");
-  else if (stage === "ready" && now.phase === "done" && game) show(verdict(), `${where}: game ${game + 1} of ${games} is next.`, "Next game");
-  else if (stage === "ready") show(where, `${match.what} ${games} ${games === 1 ? "game" : "games"}. ${howTo()}`, "Start");
-  else notice(sits, -1, stage === "match");
+  if (wanted) { hide(); return; }
+  const { block, game: number, games, time_left, waits } = now.study, start = (text) => [[text, () => send("start")]];
+  const part = block < 0 ? "Practice" : `Part ${block + 1} of ${match.study.blocks}`;
+  const idle = !["play", "countdown", "pause"].includes(now.phase);
+  if (game.down) lostNotice();
+  else if (stage === "busy") show("A session is running", "Please wait until it is over.");
+  else if (stage === "partner" && idle) show("Please wait", "You play in some parts of this session. Thank you for taking part.");
+  else if (stage === "partner" && !sits) show("Please wait", "You play in another part of this session.");
+  else if (stage === "rest") show("A break", `${part} begins in ${time_left} s.`);
+  else if (stage === "over") show(verdict(), why());
+  else if (stage === "ready" && waits) show(part, "Waiting for the other player.");
+  else if (stage === "ready" && now.phase === "done" && number) show(verdict(), `${part}: game ${number + 1} of ${games} is next.`, start("Next game"));
+  else if (stage === "ready") show(part, `${match.what} ${games} ${games === 1 ? "game" : "games"}. ${howTo()}`, start("Start"));
+  else playNotice(stage === "match");
 }
+$("withdraw").onclick = () => { leaving = true; };

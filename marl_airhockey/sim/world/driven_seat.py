@@ -78,6 +78,11 @@ class DrivenSeat:
             self._memory[name][worlds] = row
 
     @property
+    def memory(self) -> Mapping[str, Array]:
+        """Memory of the driver, arrays (B, ...)."""
+        return self._memory
+
+    @property
     def acts(self) -> bool:
         """True if `act` must be called, for an action or to command a device."""
         return self.driver.commands_device or self.driver.measured() is None

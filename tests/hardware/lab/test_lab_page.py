@@ -9,7 +9,8 @@ import pytest
 
 from marl_airhockey.play.client import Client
 from marl_airhockey.play.handicap import Handicap
-from marl_airhockey.play.open_table import Plant, open_table
+from marl_airhockey.play.open_table import open_table
+from marl_airhockey.play.plant import Plant
 from marl_airhockey.play.real_match import RealMatch
 
 

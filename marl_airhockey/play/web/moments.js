@@ -1,0 +1,68 @@
+// Goals as moments: play stops, then the last second and a half is shown again slowly.
+
+import { colourOf } from "./colours.js";
+import { between } from "./scene.js";
+import { game, on, scorerOf } from "./state.js";
+import { scoredForMe } from "./sound.js";
+
+const CLIP = 1.5; // s of play before a goal
+export const STOP = 0.6; // s for which the goal itself is shown
+const SLOW = 0.5; // speed of the replay
+const LENGTH = STOP + CLIP / SLOW;
+
+let recent = [], current = null, began = 0;
+export let best = null; // clip of the best goal of this match: frames, speed, scorer
+
+on("match", () => { recent = []; current = best = null; });
+on("frame", (frame, before, at) => {
+  if (before && frame.n < before.n) { recent = []; best = null; }
+  const goal = before && frame.n > before.n && frame.events.find(([kind, line]) => kind === "goal" && game.match.goal_lines[line]);
+  if (goal && game.recording === null) begin(goal[1], goal[2], before, at);
+  if (["play", "done"].includes(frame.phase) && !goal) recent.push(frame);
+  while (recent.length && recent[0].time < frame.time - CLIP - 0.2) recent.shift();
+  if (goal) recent = [];
+  // A goal that play does not stop for is only shown for as long as it would have stopped.
+  if (current && frame.phase === "countdown") current = null;
+});
+
+function begin(line, k, before, at) {
+  const frames = recent.filter((frame) => frame.time > before.time - CLIP);
+  if (!frames.length) return;
+  const last = frames.at(-1), speed = Math.hypot(last.pucks[k][2], last.pucks[k][3]);
+  frames.push(...into(last, k));
+  const scorer = scorerOf(line), mine = scoredForMe(line);
+  const clip = { frames, speed, scorer, mine, score: game.now.caption, colour: colourOf(scorer) };
+  current = clip; began = at;
+  if (mine && (!best || speed > best.speed)) best = clip;
+}
+
+// The puck rolls on into the goal for a moment, because the frame of the goal may serve it again.
+function into(last, k) {
+  return [1, 2, 3].map((i) => ({
+    ...last, n: last.n + i, time: last.time + i / 60,
+    pucks: last.pucks.map((p, j) => (j === k ? [p[0] + (i * p[2]) / 60, p[1] + (i * p[3]) / 60, p[2], p[3]] : p)),
+  }));
+}
+
+export function skip() { current = null; }
+export const runsMoment = () => current !== null;
+
+// The frame of a clip at a time after its start, s.
+export function frameOf(clip, time) {
+  const { frames } = clip, at = frames[0].time + time;
+  const i = frames.findIndex((frame) => frame.time >= at);
+  if (i < 0) return frames.at(-1);
+  if (i === 0) return frames[0];
+  return between(frames[i - 1], frames[i], (at - frames[i - 1].time) / (frames[i].time - frames[i - 1].time));
+}
+
+// What is shown instead of the match now; null for the match itself.
+export function momentAt(at) {
+  if (!current) return null;
+  const since = (at - began) / 1000, phase = game.now.phase;
+  const stops = phase === "goal" || phase === "done";
+  if (since > (stops ? LENGTH : STOP) || phase === "lobby") { current = null; return null; }
+  const { mine, colour } = current;
+  if (since < STOP) return { frame: stops ? current.frames.at(-1) : null, title: "Goal!", mine, colour, flash: 1 - since / STOP };
+  return { frame: frameOf(current, (since - STOP) * SLOW), title: "", label: "Replay", mine, colour, flash: 0 };
+}
