@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from marl_airhockey.toolkit import Metres
 from marl_airhockey.toolkit.versus import Versus
@@ -20,6 +21,7 @@ class Doubles(Versus):
         A team wins.
     """
 
+    title: ClassVar[str] = "Two on two"
     apart: Metres = 0.24
     """Distance between teammates at the start, m."""
 

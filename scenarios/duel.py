@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from marl_airhockey.toolkit.versus import Versus
 
@@ -18,6 +19,8 @@ class Duel(Versus):
     Termination:
         A player wins.
     """
+
+    title: ClassVar[str] = "One on one"
 
     @property
     def lineup(self) -> tuple[tuple[int, float], ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -50,6 +51,7 @@ class FreeForAll(Scenario):
         One player is left.
     """
 
+    title: ClassVar[str] = "Each for themselves"
     announced = ("lives", "shots", "stopped", "scorer", "served", "serve")
     seats: str = "arcade"
     seconds: Seconds = 90.0

@@ -40,6 +40,7 @@ class HitGoal(FewShots, GoalScenario):
         Success, a touch after the last shot, or the puck crosses the home line.
     """
 
+    title: ClassVar[str] = "Hit the circle"
     version: ClassVar[int] = 1
     PATH = True
     seconds: Seconds = 10.0

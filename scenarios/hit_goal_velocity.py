@@ -46,6 +46,7 @@ class HitGoalVelocity(FewShots, GoalScenario):
         Success, a touch after the last shot, or the puck crosses the home line.
     """
 
+    title: ClassVar[str] = "Hit the circle at speed"
     version: ClassVar[int] = 1
     PATH = True
     seconds: Seconds = 10.0

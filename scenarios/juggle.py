@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -40,6 +41,7 @@ class Juggle(Scenario):
         The puck crosses the home line.
     """
 
+    title: ClassVar[str] = "Juggle"
     seconds: Seconds = 15.0
     pucks: Pucks = 1
     """Number of pucks."""

@@ -41,6 +41,7 @@ class MoveBlock(FewShots):
         Success, a touch after the last shot, or the puck crosses the home line.
     """
 
+    title: ClassVar[str] = "Move the block"
     version: ClassVar[int] = 1
     seconds: Seconds = 10.0
     way: Metres = 0.04

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,6 +31,7 @@ class PuckVelocity(FallingPuck):
         Success, or the puck crosses the home line.
     """
 
+    title: ClassVar[str] = "Hit it back fast"
     seconds: Seconds = 5.0
     fast: Speed = 1.2
     """Upward speed of the puck for a success, m/s."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -42,6 +43,7 @@ class Rally(Scenario):
         ``patience`` seconds without a counted crossing, or a puck at rest.
     """
 
+    title: ClassVar[str] = "Rally"
     announced = ("counted", "crossings", "idle")
     seats: str = "arcade"
     seconds: Seconds = 30.0

@@ -41,6 +41,7 @@ class Reach(GoalScenario):
         Success.
     """
 
+    title: ClassVar[str] = "Reach the circle"
     version: ClassVar[int] = 1
     seconds: Seconds = 3.0
     radius: Metres = 0.02

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -40,6 +41,7 @@ class ReachSequence(Scenario):
         Success.
     """
 
+    title: ClassVar[str] = "Five circles in order"
     seconds: Seconds = 6.0
     count: int = 5
     """Number of goals."""

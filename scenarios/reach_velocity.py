@@ -45,6 +45,7 @@ class ReachVelocity(GoalScenario):
         The end of the pass.
     """
 
+    title: ClassVar[str] = "Pass the circle at speed"
     version: ClassVar[int] = 1
     seconds: Seconds = 5.0
     radius: Metres = 0.04

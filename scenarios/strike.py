@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import ClassVar
 
 import numpy as np
 
@@ -39,6 +40,7 @@ class Strike(Scenario):
         Success.
     """
 
+    title: ClassVar[str] = "Strike the puck"
     seconds: Seconds = 2.0
     fast: Speed = 0.8
     """Speed of the puck for a success, m/s."""

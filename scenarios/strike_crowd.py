@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -43,6 +43,7 @@ class StrikeCrowd(Scenario):
         Success.
     """
 
+    title: ClassVar[str] = "Break the triangle"
     seconds: Seconds = 7.5
     spread: Metres = 0.08
     """Sum of displacements for a success, m. A shot at 1.04 m/s gives 0.10 to 0.12."""

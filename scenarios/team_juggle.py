@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -44,6 +45,7 @@ class TeamJuggle(Scenario):
         A puck crosses the home line.
     """
 
+    title: ClassVar[str] = "Juggle together"
     seconds: Seconds = 30.0
     pucks: Pucks = 1
     """Number of pucks."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -28,6 +29,7 @@ class Touch(FallingPuck):
         The puck crosses the home line.
     """
 
+    title: ClassVar[str] = "Touch the puck"
     seconds: Seconds = 5.0
 
     def update_memory(self, t: Transition) -> Memory:

@@ -7,6 +7,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from marl_airhockey.play.live_match import LiveMatch
+from marl_airhockey.play.messages import title_of
 from marl_airhockey.registry import make_scenario
 
 
@@ -34,13 +35,14 @@ class GameMenu:
     @property
     def rows(self) -> list[dict[str, Any]]:
         """JSON of the menu: name, title and number of seats of each game."""
+        found = {name: make_scenario(name) for name in self.names}
         return [
             {
                 "name": name,
-                "title": name.replace("_", " ").capitalize(),
-                "seats": len(make_scenario(name).scene.seats),
+                "title": title_of(scenario),
+                "seats": len(scenario.scene.seats),
             }
-            for name in self.names
+            for name, scenario in found.items()
         ]
 
     def choose(self, name: str) -> None:

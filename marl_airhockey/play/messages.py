@@ -74,6 +74,7 @@ def description(scenario: Scenario, seconds: float) -> dict[str, Any]:
     scene, table = scenario.scene, scenario.scene.table
     return {
         "scenario": scenario.name,
+        "title": title_of(scenario),
         "seconds": round(seconds, 4),
         "table": rounded(np.asarray(table.vertices)),
         "normals": rounded(table.normals),
@@ -99,6 +100,11 @@ def description(scenario: Scenario, seconds: float) -> dict[str, Any]:
         "mouse": {"gain": GAIN, "brake": BRAKE},
         "what": what(scenario),
     }
+
+
+def title_of(scenario: Scenario) -> str:
+    """Return the title of a scenario for people who play it."""
+    return scenario.title or scenario.name.replace("_", " ").capitalize()
 
 
 def _goal_lines(scene: Scene) -> list[dict[str, Any]]:

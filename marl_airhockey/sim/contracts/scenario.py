@@ -84,6 +84,8 @@ class Scenario(ABC):
     With simulated sensing, the other arrays are computed from the sensed states."""
     version: ClassVar[int] = 0
     """Version in the gymnasium id, raised whenever numbers of the scenario change."""
+    title: ClassVar[str] = ""
+    """Title for people who play it; by default its name."""
 
     def __post_init__(self) -> None:
         for name, value in checked_options(self).items():
