@@ -48,6 +48,7 @@ def host_match(
     film: bool = False,
     keep: int | None = None,
     menu: GameMenu | None = None,
+    tournament: bool = False,
 ) -> None:
     """Serve a match until interrupted; in the virtual lab, with buttons for its faults.
 
@@ -60,11 +61,15 @@ def host_match(
         film: True to record the video of a real table's camera.
         keep: Largest number of recordings of this table; None for no limit.
         menu: Games among which players choose; None for the match only.
+        tournament: True to host a tournament between the people at the pages.
     """
     from marl_airhockey.play.open_table import GOAL_STOP, open_table
     from marl_airhockey.play.real_match import RealMatch
     from marl_airhockey.play.recorder import Recorder
+    from marl_airhockey.play.seats import Seats
     from marl_airhockey.play.server import application
+    from marl_airhockey.play.session import Session
+    from marl_airhockey.play.tournament_table import TournamentTable
 
     filmed = match.backend.camera if film and isinstance(match, RealMatch) else None
     recorder = Recorder(record, filmed, keep) if record else None
@@ -72,7 +77,10 @@ def host_match(
         plant = None
         if isinstance(match, RealMatch):
             plant = stack.enter_context(lab_plant(match.backend.rig.operator))
-        session = open_table(match, recorder, plant, menu)
+        if tournament:
+            session = Session(TournamentTable(Seats(match), recorder))
+        else:
+            session = open_table(match, recorder, plant, menu)
         if not isinstance(match, RealMatch):
             match.goal_stop = GOAL_STOP
         if match.keywords.get("backend") == "robosuite":

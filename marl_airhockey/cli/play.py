@@ -73,6 +73,14 @@ def play(
     reaction: Reaction = None,
     noise: Noise = None,
     pace: Pace = None,
+    tournament: Annotated[
+        bool,
+        typer.Option(
+            "--tournament",
+            help="Host a knock-out tournament: people enter their names on the page "
+            "and play in pairs.",
+        ),
+    ] = False,
     record: Annotated[
         Path | None,
         typer.Option(
@@ -100,6 +108,7 @@ def play(
     require("uvicorn", "play")
     from marl_airhockey.play.game_menu import GameMenu
     from marl_airhockey.play.live_match import LiveMatch
+    from marl_airhockey.play.match_drivers import PERSON
     from marl_airhockey.play.real_match import RealMatch
 
     kind = RealMatch if environment.backend == REAL else LiveMatch
@@ -118,14 +127,19 @@ def play(
     keywords.setdefault("control_dt", kind.CONTROL_DT)
     if scenario is not None:
         keywords = _as_trained(scenario, {opponent, *seats.values()}, keywords)
-    names = scenario_names() if scenario is None and kind is LiveMatch else []
+    chooses = scenario is None and kind is LiveMatch and not tournament
+    names = scenario_names() if chooses else []
     menu = GameMenu(names, lambda name: prepare(name, keywords))
     with environment.table(keywords) as table:
         with waiting("preparing the table (the first time takes longer)"):
             match = prepare(scenario or FIRST, table)
         if record:
             console.print(f"recordings: {record}, at most {keep} of this table")
-        host_match(match, record, host, port, browser, keep=keep, menu=menu)
+        if tournament:
+            for i in range(len(match.seats)):
+                match.set_driver(i, PERSON)
+        pages = record, host, port, browser
+        host_match(match, *pages, keep=keep, menu=menu, tournament=tournament)
 
 
 def _as_trained(scenario: str, names: set[str | None], given: Keywords) -> Keywords:

@@ -54,10 +54,11 @@ def ladder_of(scenario: str, policies: Sequence[str], contest: bool) -> list[Lev
         return [Level(name, f"allround:strength={how}") for name, how in SCRIPTS]
     numbered = {number: f"zoo/{scenario}_{number}" for _, number, _ in RUNGS}
     best = policies[0]
-    return [
-        Level(name, numbered[n] if numbered[n] in policies else best, handicap)
-        for name, n, handicap in RUNGS
-    ]
+    levels: dict[tuple[str, Handicap], Level] = {}
+    for name, n, handicap in RUNGS:
+        driver = numbered[n] if numbered[n] in policies else best
+        levels.setdefault((driver, handicap), Level(name, driver, handicap))
+    return list(levels.values())
 
 
 def usual_level(levels: Sequence[Level]) -> Level:

@@ -46,6 +46,8 @@ MESSAGES: dict[str, dict[str, type]] = {
     "join": {},
     "game": {"name": str},
     "lobby": {},
+    "name": {"text": str},
+    "begin": {},
     "insight": {"on": int},
     "checkpoint": {"seat": int, "name": str},
     "fault": {"name": str, "on": int},

@@ -61,7 +61,9 @@ function figures() {
 
 function buttons() {
   const { now, match } = game, row = element("div", "", "row"), next = nextLevel();
-  if (mayControl()) {
+  if (match.tournament) {
+    if (now.name && !now.reason) row.append(button("Next match", () => send("start"), "main"));
+  } else if (mayControl()) {
     if (next) row.append(button(`Next: ${levelTitle(next)}`, () => { send("opponent", { seat: opponentOf(now.seat), name: next }); send("start"); }, "main"));
     row.append(button(next ? "Again" : "Play again", () => send("start"), next ? "" : "main"));
     if (now.offers_golden_goal) row.append(button("Golden goal: the next goal wins", () => send("golden_goal")));

@@ -3,7 +3,7 @@
 import { colourOf } from "./colours.js";
 import { steering } from "./input.js";
 import { runsMoment } from "./moments.js";
-import { $, element, game, linkRate, mayControl, put, runs, words } from "./state.js";
+import { $, element, game, linkRate, mayControl, put, runs } from "./state.js";
 
 const SETTLED = 3000; // ms after the connection until a slow link is reported
 let scored = null;
@@ -29,14 +29,15 @@ function scoreboard() {
 export function forgetScore() { scored = null; }
 
 export function updateHud() {
-  const { match, now } = game, name = words(match.scenario), left = Math.max(0, match.seconds - now.time);
+  const { match, now } = game, name = match.title, left = Math.max(0, match.seconds - now.time);
   put($("game"), now.golden_goal ? "The next goal wins" : name);
   const title = `Air hockey: ${name}`;
   if (document.title !== title) document.title = title;
   scoreboard();
   put($("clock"), `${left.toFixed(0)} s`);
   $("clock").classList.toggle("last", left < 10 && match.seconds > 20 && now.phase === "play");
-  const playing = (runs() || now.phase === "pause" || runsMoment()) && !game.recording;
+  // A participant of a study can withdraw in a pause; a real table keeps its controls.
+  const playing = (runs() || (now.phase === "pause" && !match.study) || runsMoment()) && !game.recording && !match.camera;
   document.body.classList.toggle("lobby", now.phase === "lobby" && !game.recording);
   document.body.classList.toggle("playing", playing && now.phase !== "arrange");
   put($("pause").firstElementChild, match.camera ? "Stop" : game.recording ? (game.recording.runs ? "Pause" : "Play") : "Pause");
@@ -51,7 +52,7 @@ function details() {
   const { now } = game, trip = steering.roundTrip;
   put($("trip"), trip === null ? "" : `round trip ${trip.toFixed(0)} ms`);
   put($("rate"), `loop ${now.rate.toFixed(1)} Hz`);
-  put($("drivers"), now.seats.map((seat) => seat.driver).join(", "));
+  put($("drivers"), game.match.scenario + ": " + now.seats.map((seat) => seat.driver).join(", "));
   put($("caption"), now.caption);
   put($("watching"), now.watching ? `${now.watching} watching` : "");
   $("recording").hidden = !now.recording && !now.not_recorded;

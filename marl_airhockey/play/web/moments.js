@@ -27,8 +27,8 @@ on("frame", (frame, before, at) => {
 
 function begin(line, k, before, at) {
   const frames = recent.filter((frame) => frame.time > before.time - CLIP);
-  if (!frames.length) return;
-  const last = frames.at(-1), speed = Math.hypot(last.pucks[k][2], last.pucks[k][3]);
+  if (!frames.length) frames.push(before);
+  const last = frames.at(-1), speed = Math.max(...frames.map((frame) => Math.hypot(frame.pucks[k][2], frame.pucks[k][3])));
   frames.push(...into(last, k));
   const scorer = scorerOf(line), mine = scoredForMe(line);
   const clip = { frames, speed, scorer, mine, score: game.now.caption, colour: colourOf(scorer) };

@@ -10,6 +10,7 @@ import { hideStart, howTo, showStart } from "./start.js";
 import { freeSeat, game, mayControl, send } from "./state.js";
 import { lastTry, seriesOver, showTries, summary, triesRun } from "./tries.js";
 import { updateStudy } from "./study.js";
+import { hideTournament, showTournament } from "./tournament.js";
 
 const LONG = 10; // s without a connection after which the page explains what to do
 
@@ -18,7 +19,7 @@ const sentence = (text) => (text ? `${text[0].toUpperCase()}${text.slice(1)}.` :
 
 export function lostNotice() {
   const detail = lostFor() < LONG ? "Trying again…" : "The server does not answer. When it runs again, this page continues by itself.";
-  show("No connection", game.refused || detail);
+  show(game.refused ? "Please wait" : "No connection", game.refused || detail);
 }
 
 export function updateScreens() {
@@ -28,7 +29,8 @@ export function updateScreens() {
   if (screen !== "start") hideStart();
   if (screen !== "card") hideCard();
   if (screen !== "notice") hide();
-  if (screen === "start") showStart();
+  if (screen !== "start" || !match.tournament) hideTournament();
+  if (screen === "start") match.tournament ? showTournament() : showStart();
   else if (screen === "card") seriesOver() ? showSeries() : showCard();
   else if (game.outdated) show("A new version", "The server was updated while this page was open.", [["Load the page again", () => location.reload()]]);
   else if (match.study) updateStudy();

@@ -3,7 +3,7 @@
 import { invitation } from "./invite.js";
 import { bestToday, recordOf } from "./record.js";
 import { seatRows } from "./seats.js";
-import { $, capital, element, freeSeat, game, isPerson, isTask, mayControl, send, teams, words } from "./state.js";
+import { $, element, freeSeat, game, isPerson, isTask, mayControl, send, teams } from "./state.js";
 import { levelTitle, opponentOf } from "./titles.js";
 import { touch } from "./device.js";
 
@@ -29,7 +29,7 @@ export function showStart() {
   if (state === shown) return;
   shown = state;
   const parts = [element("h1", "Air hockey"), ...tabs(tab)];
-  if (now.opening) parts.push(element("p", `Preparing ${words(now.opening)}…`, "aim"));
+  if (now.opening) parts.push(element("p", `Preparing ${match.games.find((g) => g.name === now.opening).title}…`, "aim"));
   else parts.push(...{ ladder, tasks, together }[tab](), ...entry());
   $("start").replaceChildren(...parts);
 }
@@ -136,4 +136,3 @@ export const howTo = () => {
   if (game.match.camera) return "Hold the button down on the table to move the arm. Nothing moves before Start.";
   return touch.used ? "Drag a finger on the table: your paddle is above it." : "Move the pointer to move your paddle. Space starts.";
 };
-export const titleOfGame = (name) => capital(words(name));

@@ -27,7 +27,8 @@ export class View {
     this.tall = tall;
   }
 
-  get dense() { return this.canvas.width / Math.max(this.canvas.clientWidth, 1) || 1; }
+  // Pixels of the canvas per CSS pixel; 1 for a canvas that is not in the page.
+  get dense() { return this.canvas.clientWidth ? this.canvas.width / this.canvas.clientWidth : 1; }
 
   toScreen(x, y) {
     const { right, up, scale, centre, middle } = this;
