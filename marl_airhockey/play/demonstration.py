@@ -13,6 +13,10 @@ DRAWN = (
 """Fields of a state of a match that change the image of the table."""
 
 
+WITHOUT_POLICY = "sticky"
+"""Driver of a task without a policy; it suits every task."""
+
+
 class Demonstration:
     """Match of the best policies that is repeated, apart from the people's match."""
 
@@ -26,10 +30,13 @@ class Demonstration:
             match: Match of the people, which defines scenario and keywords.
         """
         if self._match is None:
-            self._match = LiveMatch(match.world.scenario.name, {}, match.keywords)
-            best = self._match.drivers.ladder[-1]
-            for i in range(len(self._match.seats)):
-                self._match.set_driver(i, best.driver, best.handicap)
+            self._match = LiveMatch(match.scenario, {}, match.keywords)
+            drivers, seats = self._match.drivers, range(len(self._match.seats))
+            best = drivers.ladder[-1].driver
+            if len(seats) == 1 and not drivers.fitting_policies:
+                best = WITHOUT_POLICY
+            for i in seats:
+                self._match.set_driver(i, best)
         if self._match.phase in ("lobby", "done"):
             self._match.start()
             self._match.time_left = 0.0

@@ -61,7 +61,7 @@ class LiveMatch:
     ) -> None:
         usual: Keywords = {"control_dt": self.CONTROL_DT}
         self.keywords: Keywords = {**usual, **keywords}
-        self._scenario, self._rules = scenario, self.keywords
+        self.scenario, self._rules = scenario, self.keywords
         self.world = self._build()
         agents = [f"paddle_{i}" for i in range(len(self.seats))]
         for agent in drivers:
@@ -211,7 +211,7 @@ class LiveMatch:
         # Policies with any observation type can take a seat at any time, except pixels,
         # which no policy of the zoo uses.
         forms = [form for form in OBSERVE if form != "pixels"]
-        return build_world(self._scenario, 1, False, self.keywords, forms)
+        return build_world(self.scenario, 1, False, self.keywords, forms)
 
     def pause(self, reason: str = "") -> None:
         """Pause a running match."""

@@ -54,10 +54,10 @@ def press(page, text):
 
 def point_of(page, x, y):
     """The point of the window at a point of the table, px."""
-    script = (
-        "([x, y]) => airhockey.view.toScreen(x, y).map((v) => v / devicePixelRatio)"
-    )
-    return page.evaluate(script, [x, y])
+    box = page.locator("#table").bounding_box()
+    pixels = "airhockey.view.toScreen(x, y).map((v) => v / devicePixelRatio)"
+    across, down = page.evaluate(f"([x, y]) => {pixels}", [x, y])
+    return box["x"] + across, box["y"] + down
 
 
 def state_of(page):

@@ -2,6 +2,7 @@
 
 import time
 
+import numpy as np
 import pytest
 from pages import page_at, point_of, press, running, served, state_of, wait
 from study_steps import plan_writer
@@ -9,6 +10,48 @@ from study_steps import plan_writer
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.open_table import open_table
 from marl_airhockey.play.recorder import Recorder
+
+
+def strike_until_done(page):
+    """Play against an opponent that does not move, until the match is over."""
+    began = time.monotonic()
+    while (state := state_of(page))["phase"] == "play":
+        # Get behind the puck, then through it.
+        x, y = state["pucks"][0][:2]
+        behind = state["paddles"][0][0] < x - 0.06
+        page.mouse.move(*point_of(page, min(x, -0.06) if behind else x - 0.2, y))
+        page.wait_for_timeout(16)
+        assert time.monotonic() - began < 55, "no goal against nobody"
+    wait(page, "s.phase === 'done'")
+
+
+@pytest.mark.slow
+def test_the_best_goal_is_saved_as_a_video(browser, tmp_path):
+    av = pytest.importorskip("av")
+    complaints = []
+    options = ("--opponent", "still", "--option", "goals_to_win=1")
+    with served("duel", *options) as (address, _):
+        page = page_at(browser, address, complaints, accept_downloads=True)
+        button = page.get_by_role("button", name="Save the best goal as a video")
+        page.keyboard.press("Space")
+        wait(page, "s.phase === 'play'")
+        strike_until_done(page)
+        page.locator("#card h1").wait_for()
+        if state_of(page)["success"] != [0]:
+            pytest.skip("it was an own goal")
+        with page.expect_download(timeout=60_000) as download:
+            button.click()
+        path = tmp_path / download.value.suggested_filename
+        download.value.save_as(path)
+        page.close()
+    assert not complaints
+    with av.open(str(path)) as video:
+        frames = [frame.to_ndarray(format="rgb24") for frame in video.decode(video=0)]
+        codec = video.streams.video[0].codec_context.name
+    assert codec in ("h264", "vp9", "vp8")
+    assert frames[0].shape == (720, 1280, 3)
+    assert len(frames) > 60
+    assert np.abs(frames[-1].astype(float) - frames[len(frames) // 2]).max() > 50
 
 
 def test_a_person_plays_in_the_browser(browser):
@@ -21,15 +64,7 @@ def test_a_person_plays_in_the_browser(browser):
         wait(page, "s.phase === 'play'")
         page.mouse.move(*point_of(page, -0.5, 0.15))
         wait(page, "Math.hypot(s.paddles[0][0] + 0.5, s.paddles[0][1] - 0.15) < 0.03")
-        began = time.monotonic()
-        while (state := state_of(page))["phase"] == "play":
-            # Get behind the puck, then through it.
-            x, y = state["pucks"][0][:2]
-            behind = state["paddles"][0][0] < x - 0.06
-            page.mouse.move(*point_of(page, min(x, -0.06) if behind else x - 0.2, y))
-            page.wait_for_timeout(16)
-            assert time.monotonic() - began < 55, "no goal against nobody"
-        wait(page, "s.phase === 'done'")
+        strike_until_done(page)
         # The goal is shown again before the card.
         page.locator("#moment").get_by_text("Replay").wait_for()
         assert not page.locator("#card").is_visible()

@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from pages import page_at, running, state_of, wait
+from pages import page_at, point_of, running, state_of, wait
 
 from marl_airhockey.data.extract import extract
 from marl_airhockey.data.reader import read_recording
@@ -14,24 +14,20 @@ from marl_airhockey.hardware.lab.lab import LabClient
 
 def begin(page):
     """Begin an episode; after a stop of the arm, look at it and let it go on."""
-    page.locator("#go").click()
+    page.locator("button.main:visible").click()
     until = time.monotonic() + 40
     while (state := state_of(page))["phase"] != "play":
         assert time.monotonic() < until, state["reason"]
         if "May it continue?" in state["reason"]:
             page.wait_for_timeout(5600)
         if state["phase"] in ("pause", "done"):
-            page.locator("#go").click()
+            page.locator("button.main:visible").click()
         page.wait_for_timeout(30)
 
 
 def point(page, x, y):
     """Move the pointer to a place of the table."""
-    box = page.locator("#table").bounding_box()
-    across, down = page.evaluate(
-        f"toScreen({x}, {y}).map((v) => v * canvas.clientWidth / canvas.width)"
-    )
-    page.mouse.move(box["x"] + across, box["y"] + down)
+    page.mouse.move(*point_of(page, x, y))
 
 
 class Truth(threading.Thread):
