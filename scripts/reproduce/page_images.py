@@ -21,7 +21,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from PIL import Image
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import BrowserType, Page, sync_playwright
 
 IMAGES = Path(__file__).parents[2] / "docs" / "images"
 WIDE, PHONE = (1120, 630), (390, 844)
@@ -46,8 +46,16 @@ def served(*options: str) -> Iterator[str]:
         process.wait(10)
 
 
-def opened(browser: Browser, address: str, size: tuple[int, int]) -> Page:
-    """Return a page of an address after its first frames."""
+def opened(browsers: BrowserType, address: str, size: tuple[int, int]) -> Page:
+    """Return a page of an address, in a browser of its own, after its first frames.
+
+    A page that another page of the browser hides pauses its match.
+    """
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is None:
+        raise SystemExit("Chromium is not installed: apt-get install chromium")
+    options = ["--no-sandbox", "--disable-gpu"]
+    browser = browsers.launch(executable_path=chromium, args=options)
     window: Any = {"width": size[0], "height": size[1]}
     phone = size == PHONE
     page = browser.new_page(
@@ -80,19 +88,13 @@ def main(
     out: Annotated[Path, typer.Option(help="Folder of the images.")] = IMAGES,
 ) -> None:
     """Take the screenshots."""
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    if chromium is None:
-        raise SystemExit("Chromium is not installed: apt-get install chromium")
     with served() as address, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=chromium, args=["--no-sandbox", "--disable-gpu"]
-        )
-        page = opened(browser, address, WIDE)
+        page = opened(playwright.chromium, address, WIDE)
         shots = [taken(page)]
         page.get_by_role("button", name="How it thinks").click()
         page.locator("#go").click()
         page.wait_for_function("airhockey.state().phase === 'play'")
-        phone = opened(browser, address, PHONE)
+        phone = opened(playwright.chromium, address, PHONE)
         rng = np.random.default_rng(0)
         for _ in range(40):
             # Follow the puck, so that something happens.
@@ -103,8 +105,8 @@ def main(
             page.wait_for_timeout(100)
             if state["phase"] == "goal":
                 page.keyboard.press("Space")
+                page.wait_for_function("airhockey.state().phase === 'play'")
         shots += [taken(page), taken(phone)]
-        browser.close()
     beside(shots, 480).save(out / "play.png", optimize=True)
 
 

@@ -51,7 +51,8 @@ def test_the_best_goal_is_saved_as_a_video(browser, tmp_path):
     assert codec in ("h264", "vp9", "vp8")
     assert frames[0].shape == (720, 1280, 3)
     assert len(frames) > 60
-    assert np.abs(frames[-1].astype(float) - frames[len(frames) // 2]).max() > 50
+    last = frames[-1].astype(float)
+    assert max(np.abs(last - frame).max() for frame in frames[::10]) > 100
 
 
 def test_a_person_plays_in_the_browser(browser):

@@ -33,7 +33,10 @@ function resize() {
 }
 new ResizeObserver(resize).observe(view.canvas);
 on("match", () => { fitted = null; trails.clear(); forgetScore(); });
-on("frame", (frame) => trails.add(frame));
+on("frame", (frame) => {
+  trails.add(frame);
+  if (frame.events.some(([kind]) => kind === "goal")) trails.clear();
+});
 
 // The table keeps its place while a match runs: only another match, seat or size moves it.
 function fit() {

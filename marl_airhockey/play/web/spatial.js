@@ -1,6 +1,6 @@
 // The 3D scene of simulated arms, beside the table.
 
-import { $, game, on, put } from "./state.js";
+import { $, game, on, probe, put } from "./state.js";
 import { Stream } from "./stream.js";
 
 const stream = new Stream("scene", () => Boolean(game.match && game.match.scene && game.now && !game.now.scene));
@@ -18,5 +18,5 @@ export function updateSpatial() {
   const canvas = $("scene"), { width, height } = stream.image;
   if (canvas.width !== width) { canvas.width = width; canvas.height = height; }
   canvas.getContext("2d").drawImage(stream.image, 0, 0);
-  stream.drawn();
+  if (stream.drawn()) probe.pictures.push(performance.now());
 }

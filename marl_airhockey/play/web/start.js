@@ -78,7 +78,8 @@ function ladder() {
     list.prepend(row);
   });
   const named = now.seats[seat].level || isPerson(now.seats[seat]) ? [] : [element("p", `Opponent: ${levelTitle(now.seats[seat].driver)}`, "aim")];
-  const aim = done ? "You have beaten the champion." : beaten ? `${beaten} of ${match.ladder.length} beaten. Beat the champion!` : "Beat the champion!";
+  const best = top === "champion" ? "the champion" : top;
+  const aim = done ? `You have beaten ${best}.` : beaten ? `${beaten} of ${match.ladder.length} beaten. Beat ${best}!` : `Beat ${best}!`;
   return [element("p", aim, "aim"), ...named, list];
 }
 
