@@ -43,6 +43,8 @@ class Client:
         """Newest message to send; it replaces a message that was not sent in time."""
         self.events: list[list[Any]] = []
         """Events since the last frame that was sent, see `LiveMatch.events`."""
+        self.edition = -1
+        """Edition of the host to which the newest message belongs."""
         self.frame_number = 0
         """Number of the newest message."""
         self.frame_ready = asyncio.Event()

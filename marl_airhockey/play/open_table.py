@@ -152,7 +152,8 @@ class OpenTable(Host):
         super().close()
 
     def own_fields(self, client: Client) -> dict[str, Any]:
-        return {"queue": self.visitors.position(client)}
+        idle = self.seats.idle_warning(client, time.monotonic())
+        return {"queue": self.visitors.position(client), "idle": idle}
 
     def disconnected(self, client: Client) -> None:
         """Free the seat of a page that disconnected, and reserve it for `GRACE`."""

@@ -15,6 +15,8 @@ from marl_airhockey.sim.core.recording import Columns
 
 IDLE = 60.0
 """Time without a movement after which a person is idle, s."""
+WARNING = 15.0
+"""Time before the loss of a seat in which an idle page shows a warning, s."""
 LET_GO = 0.3
 """Time without a message of a pointer that is held down after which an arm rests, s."""
 
@@ -88,6 +90,12 @@ class Seats:
         mouse.rest()
         client.seat = None
         self.match.pause(reason)
+
+    def idle_warning(self, client: Client, now: float) -> int | None:
+        """Return the time until a page is idle, s, if it is short; else None."""
+        left = IDLE - (now - client.last_input)
+        is_near = client.seat is not None and left < WARNING
+        return max(0, round(left)) if is_near else None
 
     def is_idle(self, client: Client, now: float) -> bool:
         """Return True for a page with a seat and no movement for `IDLE`."""

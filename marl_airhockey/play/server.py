@@ -189,12 +189,14 @@ async def _write(socket: WebSocket, session: Session, client: Client) -> None:
     try:
         edition = -1
         while True:
-            if edition != session.host.edition:
-                edition = session.host.edition
-                described = {"t": "match", "version": VERSION, **session.describe()}
-                await socket.send_json(described)
             await client.frame_ready.wait()
             client.frame_ready.clear()
+            if client.edition != session.host.edition:
+                continue  # A frame of the last game.
+            if edition != client.edition:
+                edition = client.edition
+                described = {"t": "match", "version": VERSION, **session.describe()}
+                await socket.send_json(described)
             number, now = client.frame_number, time.monotonic()
             if client.link.is_due(number, now):
                 client.link.note_sent(number, now)

@@ -162,7 +162,7 @@ class Session:
             }
             own = {**fields, **self.host.own_fields(client)}
             client.frame = f"{text},{json.dumps(own, separators=(',', ':'))[1:]}"
-            client.frame_number = self._frames
+            client.frame_number, client.edition = self._frames, self.host.edition
             client.frame_ready.set()
 
     def _status(self) -> dict[str, Any]:

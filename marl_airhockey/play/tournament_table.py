@@ -15,10 +15,12 @@ from marl_airhockey.play.open_table import OpenTable
 from marl_airhockey.play.plant import Plant
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.seats import Seats
-from marl_airhockey.play.tournament import Tournament
+from marl_airhockey.play.tournament import Pairing, Tournament
 
 PATIENCE = 30.0
 """Time for which a pair waits for an absent player, s."""
+TIE, RESULT = 4.0, 20.0
+"""Times for which a tie and a result are shown, s. The pair can end the latter."""
 
 
 class TournamentTable(OpenTable):
@@ -41,8 +43,12 @@ class TournamentTable(OpenTable):
         self.tournament = Tournament()
         self._waits_since = time.monotonic()
         """Time since which the current pair is not complete, s."""
+        self._pair: Pairing | None = None
+        """Pair at the table, until the next one is called."""
         self._decided = False
         """True from the end of a match until the next pair is called."""
+        self._over_since = 0.0
+        """Time of the end of the last match, s."""
         own = ("aim", "stick", "pause", "insight")
         self._own: dict[str, Handler] = {
             **{name: self._handlers[name] for name in own},
@@ -61,7 +67,7 @@ class TournamentTable(OpenTable):
 
     def status(self) -> dict[str, Any]:
         state = {**super().status(), "tournament": self.tournament.state()}
-        pair, names = self.tournament.current, self.tournament.names
+        pair, names = self._pair, self.tournament.names
         if pair is not None:
             taken = {client.seat for client in self.seats.clients}
             state["seats"] = [
@@ -76,7 +82,8 @@ class TournamentTable(OpenTable):
         return state
 
     def own_fields(self, client: Client) -> dict[str, Any]:
-        return {"queue": 0, "name": self.tournament.names.get(client.key, "")}
+        name = self.tournament.names.get(client.key, "")
+        return {"queue": 0, "idle": None, "name": name}
 
     def disconnected(self, client: Client) -> None:
         if client.seat is not None:
@@ -87,6 +94,8 @@ class TournamentTable(OpenTable):
     def check_presence(self, now: float) -> None:
         """Seat the current pair; a player who is absent too long loses the match."""
         self._seat_pair()
+        if self._decided and now - self._over_since > RESULT:
+            self._next_pair()
         pair = self.tournament.current
         if pair is None or not self.seats.free or self._decided:
             self._waits_since = now
@@ -96,11 +105,15 @@ class TournamentTable(OpenTable):
 
     def after_tick(self) -> None:
         super().after_tick()
-        match, pair = self.match, self.tournament.current
-        if match.phase != "done" or match.reason or pair is None or self._decided:
+        match, now = self.match, time.monotonic()
+        if match.phase != "done" or match.reason:
+            self._over_since = now
+            return
+        if self._decided:
             return
         if not match.winners:
-            match.start_golden_goal()
+            if now - self._over_since > TIE:
+                match.start_golden_goal()
             return
         goals = match.tally.state()["scores"] or (0, 0)
         self.tournament.finish(match.winners[0], tuple(goals))
@@ -122,13 +135,13 @@ class TournamentTable(OpenTable):
 
     def _start(self, client: Client) -> None:
         """Start the match of the pair; after its result, call the next pair."""
-        if self._decided and client.key in self.tournament.names:
+        if self._decided and client.seat is not None:
             self._next_pair()
         elif client.seat is not None and not self.seats.free:
             self.match.start()
 
     def _next_pair(self) -> None:
-        self._decided = False
+        self._pair, self._decided = self.tournament.current, False
         self.clear_table("the next pair plays")
         for client in self.seats.clients:
             client.seat = None
@@ -137,7 +150,7 @@ class TournamentTable(OpenTable):
 
     def _seat_pair(self) -> None:
         """Give the seats to the pages of the current pair that are connected."""
-        pair = self.tournament.current
+        pair = self._pair
         if pair is None or self._decided:
             return
         for seat in self.seats.free:

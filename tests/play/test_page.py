@@ -86,6 +86,23 @@ def test_a_person_plays_in_the_browser(browser):
 
 
 @pytest.mark.slow
+def test_games_are_changed_on_the_start_screen(browser):
+    complaints = []
+    with served() as (address, _):
+        page = page_at(browser, address, complaints)
+        for _ in range(2):
+            press(page, "Tasks")
+            page.get_by_role("button", name="Juggle", exact=True).wait_for()
+            wait(page, "s.seats.length === 1")
+            press(page, "Ladder")
+            page.get_by_role("button", name="Gentle").wait_for()
+            press(page, "Together")
+            page.get_by_text("Waiting for another player").wait_for()
+        page.close()
+    assert not complaints
+
+
+@pytest.mark.slow
 def test_a_task_is_ten_tries_on_a_phone(browser):
     complaints = []
     with served("juggle", "--option", "seconds=0.5") as (address, _):

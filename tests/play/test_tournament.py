@@ -91,7 +91,11 @@ def test_pairs_sit_in_turn_and_the_winner_goes_on(session):
     state = json.loads(clients[2].frame)["tournament"]
     assert state["rounds"][0][1]["winner"] == "N1"
     assert state["current"]["players"] == ["N2", "N1"]
+    shown = [seat["title"] for seat in json.loads(clients[2].frame)["seats"]]
+    assert shown == ["N0", "N1"], "the result is that of the pair at the table"
     session.receive(clients[2], line("start"))
+    assert clients[2].seat is None, "only the pair ends the result"
+    session.receive(clients[1], line("start"))
     assert [client.seat for client in clients] == [None, 1, 0]
     session.receive(clients[1], line("start"))
     score_for(session, 0)

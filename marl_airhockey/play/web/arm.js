@@ -46,6 +46,7 @@ on("match", (match) => {
   document.body.classList.toggle("with-real", Boolean(match.camera));
   if (!match.camera) return;
   if (!pictured) askForImage();
+  $("fault-title").hidden = !Object.keys(match.faults).length;
   $("faults").replaceChildren(...Object.entries(match.faults).map(([name, meaning]) => {
     const button = element("button", name.replaceAll("_", " "));
     button.title = meaning; button.dataset.fault = name;
@@ -82,7 +83,11 @@ export function updateArm() {
 }
 
 // The fault of the robot, which is more important than an invitation to start; "" for none.
-export const robotFault = () => (game.match.camera && game.now.table && game.now.table.fault !== "none" ? game.now.table.fault : "");
+export function robotFault() {
+  const { table } = game.now;
+  if (!game.match.camera || !table) return "";
+  return table.fault !== "none" ? table.fault : table.camera || "";
+}
 
 // Why a paddle that a person moves rests; "" if none does.
 export function atRest() {

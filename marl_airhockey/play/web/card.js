@@ -29,7 +29,7 @@ export function showCard() {
   if (state === shown) return;
   shown = state;
   const headline = element("h1", verdict());
-  if (game.now.success.length) headline.style.color = colourOf(game.now.seat !== null && ownResult() === "won" ? game.now.seat : game.now.success[0]);
+  if (game.now.success.length && ownResult() !== "lost") headline.style.color = colourOf(game.now.success[0]);
   $("card").replaceChildren(headline, element("p", capital(why()), "facts"), ...(game.now.reason ? [] : [score(), figures()]), buttons());
 }
 
@@ -62,14 +62,15 @@ function figures() {
 function buttons() {
   const { now, match } = game, row = element("div", "", "row"), next = nextLevel();
   if (match.tournament) {
-    if (now.name && !now.reason) row.append(button("Next match", () => send("start"), "main"));
+    if (now.seat !== null && !now.reason && now.success.length) row.append(button("Next match", () => send("start"), "main"));
+    else if (!now.success.length) row.append(element("p", "The next goal wins.", "aim"));
   } else if (mayControl()) {
     if (next) row.append(button(`Next: ${levelTitle(next)}`, () => { send("opponent", { seat: opponentOf(now.seat), name: next }); send("start"); }, "main"));
     row.append(button(next ? "Again" : "Play again", () => send("start"), next ? "" : "main"));
     if (now.offers_golden_goal) row.append(button("Golden goal: the next goal wins", () => send("golden_goal")));
     row.append(button("Menu", () => send("lobby")));
   }
-  if (best && videoKind()) row.append(button(making || "Save the best goal as a video", makeVideo));
+  if (best && now.seat !== null && videoKind()) row.append(button(making || "Save the best goal as a video", makeVideo));
   return row;
 }
 

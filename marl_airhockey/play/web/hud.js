@@ -3,6 +3,7 @@
 import { colourOf } from "./colours.js";
 import { steering } from "./input.js";
 import { runsMoment } from "./moments.js";
+import { triesRun } from "./tries.js";
 import { $, element, game, linkRate, mayControl, put, runs } from "./state.js";
 
 const SETTLED = 3000; // ms after the connection until a slow link is reported
@@ -37,7 +38,8 @@ export function updateHud() {
   put($("clock"), `${left.toFixed(0)} s`);
   $("clock").classList.toggle("last", left < 10 && match.seconds > 20 && now.phase === "play");
   // A participant of a study can withdraw in a pause; a real table keeps its controls.
-  const playing = (runs() || (now.phase === "pause" && !match.study) || runsMoment()) && !game.recording && !match.camera;
+  const playing = (runs() || (now.phase === "pause" && !match.study) || runsMoment() || (now.phase === "done" && triesRun())) && !game.recording && !match.camera;
+  document.body.classList.toggle("study", Boolean(match.study));
   document.body.classList.toggle("lobby", now.phase === "lobby" && !game.recording);
   document.body.classList.toggle("playing", playing && now.phase !== "arrange");
   put($("pause").firstElementChild, match.camera ? "Stop" : game.recording ? (game.recording.runs ? "Pause" : "Play") : "Pause");
@@ -63,6 +65,9 @@ function details() {
 function link() {
   const { now } = game, slow = linkRate() < 60 && performance.now() - game.openedAt > SETTLED && !game.recording;
   const late = slow && now.link.ms > 50 ? `, ${(now.link.ms / 1000).toFixed(1)} s delay` : "";
-  $("link").hidden = !slow;
-  put($("link"), slow ? `slow link: ${linkRate()} frames per second${late}` : "");
+  const next = now.queue === 1 ? "You are next." : now.queue ? `${now.queue - 1} before you.` : "";
+  const waits = next && now.phase !== "lobby" ? next : "", idle = Number.isInteger(now.idle) ? `Move to keep your seat: ${now.idle} s` : "";
+  const text = [idle || waits, slow ? `slow link: ${linkRate()} frames per second${late}` : ""].filter(Boolean).join(" · ");
+  $("link").hidden = !text;
+  put($("link"), text);
 }

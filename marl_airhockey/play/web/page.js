@@ -41,7 +41,8 @@ on("frame", (frame) => {
 // The table keeps its place while a match runs: only another match, seat or size moves it.
 function fit() {
   const { match, now } = game, beside = !$("insight").hidden && innerWidth >= WIDE ? $("insight").offsetWidth : 0;
-  const state = [match, now.seat, document.body.classList.contains("playing"), beside];
+  const isPlaying = document.body.classList.contains("playing"), bars = isPlaying ? 0 : $("hud").offsetHeight + 1e4 * $("foot").offsetHeight;
+  const state = [match, now.seat, isPlaying, beside, bars];
   if (fitted && fitted.every((value, i) => value === state[i])) return;
   if (!fitted || fitted[0] !== match || fitted[1] !== now.seat) forget();
   fitted = state;
@@ -58,12 +59,12 @@ function interpolated(at) {
 }
 
 function draw(at) {
+  requestAnimationFrame(draw); // first, so that no error ends the loop
   const dt = Math.min((at - drawnAt) / 1000, 0.05);
   drawnAt = at;
   if (game.recording) advance(dt);
   if (game.match && game.now) { drawMatch(at, dt); noteDrawn(); updateHud(); updateArm(); updateSpatial(); updateScreens(); }
   else if (game.down) lostNotice();
-  requestAnimationFrame(draw);
 }
 
 function drawMatch(at, dt) {
@@ -83,7 +84,7 @@ function drawMatch(at, dt) {
 
 // On a small screen the score is on the table.
 function drawScore() {
-  if (!document.body.classList.contains("playing") || Math.min(innerWidth, innerHeight) >= SMALL) return;
+  if (!document.body.classList.contains("playing") || game.now.phase === "countdown" || Math.min(innerWidth, innerHeight) >= SMALL) return;
   const { pen } = view, [x, y] = view.middle, text = game.now.caption.split(",")[0].replace(/^goals |^lives /, "");
   pen.font = `700 ${Math.round((text.length > 12 ? 0.05 : 0.12) * view.scale)}px system-ui, sans-serif`;
   pen.textAlign = "center"; pen.textBaseline = "middle";

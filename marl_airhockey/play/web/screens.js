@@ -7,7 +7,7 @@ import { runsMoment } from "./moments.js";
 import { hide, show } from "./notice.js";
 import { brokenOff, verdict, why } from "./result.js";
 import { hideStart, howTo, showStart } from "./start.js";
-import { freeSeat, game, mayControl, send } from "./state.js";
+import { capital, freeSeat, game, mayControl, send } from "./state.js";
 import { lastTry, seriesOver, showTries, summary, triesRun } from "./tries.js";
 import { updateStudy } from "./study.js";
 import { hideTournament, showTournament } from "./tournament.js";
@@ -15,7 +15,7 @@ import { hideTournament, showTournament } from "./tournament.js";
 const LONG = 10; // s without a connection after which the page explains what to do
 
 const start = (text) => [[text, () => send("start")]];
-const sentence = (text) => (text ? `${text[0].toUpperCase()}${text.slice(1)}.` : "");
+const sentence = (text) => (text ? `${capital(text)}${/[.?!]$/.test(text) ? "" : "."}` : "");
 
 export function lostNotice() {
   const detail = lostFor() < LONG ? "Trying again…" : "The server does not answer. When it runs again, this page continues by itself.";
@@ -53,10 +53,10 @@ function replayNotice() {
 export function playNotice(may) {
   const { match, now } = game, sits = now.seat !== null, free = freeSeat() >= 0;
   const alone = sits && free && !match.camera && !match.study; // others have left
-  const end = ["End match", () => send("stop")], pause = may || alone;
+  const end = [match.camera ? "Stop" : "End match", () => send("stop")], pause = may || alone;
   if (now.phase === "arrange") show("Getting ready", sentence(now.reason));
-  else if (now.phase === "countdown") show(String(Math.ceil(now.time_left)), "", [], true);
-  else if (match.camera && robotFault() && ["lobby", "done"].includes(now.phase)) show("The robot has a fault", `${sentence(robotFault())} Clear it at the robot, then start again.`, may ? start("Start") : []);
+  else if (now.phase === "countdown") show(String(Math.ceil(now.time_left)), now.golden_goal ? "The next goal wins" : "", [], true);
+  else if (match.camera && robotFault() && ["lobby", "done"].includes(now.phase)) show("A device has a fault", `${sentence(robotFault())} ${Object.keys(match.faults).length ? "Switch its fault off" : "Clear it at the device"}, then start again.`, may ? start("Start") : []);
   else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits ? `${match.what} ${howTo()}` : free ? "A seat is free: reload the page to take it." : "Waiting for the players.", may ? start("Start") : []);
   else if (now.phase === "pause" && alone) show("Paused", `${sentence(now.reason)} You can wait, continue against the computer, or end the match.`, [["Continue against the computer", () => send("substitute")], end]);
   else if (now.phase === "pause" && free && !match.study) show("Paused", `${sentence(now.reason)} ${now.queue === 1 ? "You are next." : "The next player starts a new match."}`);

@@ -9,12 +9,12 @@ import { touch } from "./device.js";
 
 const TABS = { ladder: "Ladder", tasks: "Tasks", together: "Together" };
 const LOCAL = "Another person can open this page in a second window. For other devices, start it with --host 0.0.0.0.";
-let shown = "", wanted = null; // tab that was chosen, until the game of it is open
+const PATIENCE = 2000; // ms for which a chosen tab waits for its game
+let wantedAt = 0, shown = "", wanted = null; // tab that was chosen, until the game of it is open
 
 const kindOf = () => (isTask() ? "tasks" : teams().size > 1 && game.match.seats.length === 2 && !forTwo() ? "ladder" : "together");
 const forTwo = () => game.now.seats.filter(isPerson).length > 1;
 const tabNow = () => wanted || kindOf();
-export const chosen = (tab) => { wanted = tab; };
 
 const button = (text, act, cls = "") => { const node = element("button", text, cls); node.onclick = act; return node; };
 const open = (name) => send("game", { name });
@@ -29,7 +29,11 @@ export function showStart() {
   if (state === shown) return;
   shown = state;
   const parts = [element("h1", "Air hockey"), ...tabs(tab)];
-  if (now.opening) parts.push(element("p", `Preparing ${match.games.find((g) => g.name === now.opening).title}…`, "aim"));
+  if (!isReady(tab)) {
+    parts.push(element("p", "Preparing…", "aim"));
+    if (!now.opening && performance.now() - wantedAt > PATIENCE) wanted = null; // another page has chosen
+    shown = "";
+  } else if (now.opening) parts.push(element("p", `Preparing ${match.games.find((g) => g.name === now.opening).title}…`, "aim"));
   else parts.push(...{ ladder, tasks, together }[tab](), ...entry());
   $("start").replaceChildren(...parts);
 }
@@ -48,8 +52,11 @@ function tabs(tab) {
 
 const mayChoose = () => game.now.seat !== null || mayControl();
 
+// True if the open game is one of a tab.
+const isReady = (tab) => (tab === "tasks" ? isTask() : !isTask() && (tab === "together" || kindOf() === "ladder"));
+
 function choose(tab) {
-  wanted = tab;
+  wanted = tab; wantedAt = performance.now();
   const { match, now } = game;
   if (tab === "ladder" && match.scenario !== "duel") open("duel");
   else if (tab === "ladder" && forTwo()) alone();
@@ -96,7 +103,7 @@ function tasks() {
     parts.push(list);
   }
   const { policy } = match, best = bestToday(match.scenario);
-  const facts = [`Ten tries.`, best === null ? "" : `Your best today: ${best}.`, policy && policy.success !== null ? `The policy: ${(10 * policy.success).toFixed(1)}.` : ""];
+  const facts = [`Ten tries.`, best === null ? "" : `Your best today: ${best}.`, policy && policy.success !== null ? `The trained computer: ${(10 * policy.success).toFixed(1)}.` : ""];
   return [...parts, element("p", match.what, "aim"), element("p", facts.filter(Boolean).join(" "), "facts")];
 }
 

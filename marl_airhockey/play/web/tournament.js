@@ -11,7 +11,8 @@ export function hideTournament() { shown = ""; }
 export function showTournament() {
   const { now, match } = game, { tournament } = now, state = JSON.stringify([tournament, now.name, now.seat, now.seats]);
   $("start").hidden = false;
-  if (state === shown) return;
+  const types = document.activeElement && document.activeElement.tagName === "INPUT" && !tournament.rounds.length;
+  if (state === shown || types) return;
   shown = state;
   const begun = tournament.rounds.length > 0;
   const parts = [element("h1", tournament.champion ? `${tournament.champion} wins!` : "Tournament")];
@@ -25,7 +26,7 @@ function entering({ players }) {
   field.setAttribute("aria-label", "your name");
   field.oninput = () => { typed = field.value; };
   form.append(field, Object.assign(element("button", now.name ? "Change name" : "Enter", now.name ? "" : "main"), { type: "submit" }));
-  form.onsubmit = (event) => { event.preventDefault(); if (field.value.trim()) send("name", { text: field.value }); };
+  form.onsubmit = (event) => { event.preventDefault(); field.blur(); if (field.value.trim()) send("name", { text: field.value }); };
   const parts = [form, element("p", players.length ? players.join(", ") : "Nobody has entered yet.", "aim")];
   if (now.name && players.length > 1) parts.push(button(`Begin with ${players.length} players`, () => send("begin"), "main"));
   else parts.push(element("p", "Everybody opens this page and enters a name.", "facts"));

@@ -40,6 +40,6 @@ export const lastTry = () => [results.at(-1) ? "Done!" : "Not this time", capita
 export function summary() {
   const count = results.filter(Boolean).length, { policy, scenario } = game.match, best = bestToday(scenario);
   const lines = [`Best today: ${best}`];
-  if (policy && policy.success !== null) lines.push(`The policy: ${(10 * policy.success).toFixed(1)}`);
+  if (policy && policy.success !== null) lines.push(`The trained computer: ${(10 * policy.success).toFixed(1)}`);
   return { headline: `${count} of ${TRIES}`, lines };
 }
