@@ -126,7 +126,8 @@ class HitGoal(FewShots, GoalScenario):
     def caption(self, memory: Memory) -> str:
         if np.isinf(memory["near"]):
             return "not struck yet"
-        return f"closest {100 * memory['near']:.0f} of {100 * self.radius:.0f} cm"
+        near, needed = 100 * memory["near"], 100 * self.radius
+        return f"closest {near:.0f} cm, needs {needed:.0f} cm"
 
 
 make = HitGoal

@@ -140,7 +140,8 @@ class Reach(GoalScenario):
         return [Mark.circle(memory["goal"], self.radius)]
 
     def caption(self, memory: Memory) -> str:
-        return f"distance {100 * memory['gap']:.1f} of {100 * self.radius:.0f} cm"
+        gap, needed = 100 * memory["gap"], 100 * self.radius
+        return f"distance {gap:.1f} cm, needs {needed:.0f} cm"
 
 
 make = Reach

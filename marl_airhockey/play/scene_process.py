@@ -13,7 +13,7 @@ from marl_airhockey.sim.backends.robosuite.frames import TableFrame
 
 WIDTH, HEIGHT, QUALITY = 640, 400, 80
 """Size of the images, pixels, and their JPEG quality."""
-FINER = 2
+FINER = 1.25
 """Factor of the size in which images are rendered, so that edges are smooth."""
 POLITE = 5
 """Niceness of the process; the loop of ticks has precedence."""
@@ -59,7 +59,9 @@ def _render(model: Any, frame: TableFrame, pipe: Connection) -> None:
     )
 
     make_light(model)
-    renderer = OffscreenRenderer(model, frame, FINER * WIDTH, FINER * HEIGHT)
+    renderer = OffscreenRenderer(
+        model, frame, round(FINER * WIDTH), round(FINER * HEIGHT)
+    )
     camera = whole_table(model)
     while (request := pipe.recv()) is not None:
         large = renderer.picture(request[0], camera, request[1])

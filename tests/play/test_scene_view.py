@@ -66,6 +66,7 @@ def test_view_reports_a_dead_process_and_the_match_continues(match, view):
     view.offer(match)
 
 
+@pytest.mark.slow
 def test_view_renders_nothing_while_no_page_watches(match, view):
     number, _ = next_image(view, match, -1)
     time.sleep(1.1)

@@ -84,5 +84,5 @@ function nextLevel() {
 async function makeVideo() {
   if (making) return;
   making = "Making the video, 7 s…";
-  try { await save(await videoOf(best)); making = ""; } catch (error) { making = `No video: ${error.message}`; }
+  try { await save(await videoOf(best)); making = "Saved"; setTimeout(() => { making = ""; }, 3000); } catch (error) { making = `No video: ${error.message}`; }
 }

@@ -30,7 +30,7 @@ function scoreboard() {
 export function forgetScore() { scored = null; }
 
 export function updateHud() {
-  const { match, now } = game, name = match.title, left = Math.max(0, match.seconds - now.time);
+  const { match, now } = game, name = match.tournament && now.seats[0].title ? now.seats.map((seat) => seat.title).join(" : ") : match.title, left = Math.max(0, match.seconds - now.time);
   put($("game"), now.golden_goal ? "The next goal wins" : name);
   const title = `Air hockey: ${name}`;
   if (document.title !== title) document.title = title;

@@ -69,7 +69,7 @@ const SHEETS = {
   leaving() {
     return [
       element("h1", "Withdraw?"), element("p", "This ends your participation and immediately erases all your data."),
-      button("Erase everything", () => { leaving = false; send("withdraw"); }), button("Stay", () => { leaving = false; }),
+      Object.assign(button("Erase everything", () => { leaving = false; send("withdraw"); }), { className: "main danger" }), button("Stay", () => { leaving = false; }),
     ];
   },
 };

@@ -40,7 +40,7 @@ function bracket({ rounds }) {
     for (const { players, goals, winner } of pairs) {
       const pair = element("div", "", "pair");
       players.forEach((name, i) => {
-        const row = element("div", "", winner === name ? "winner" : "");
+        const row = element("div", "", [winner === name ? "winner" : "", game.now.name === name ? "mine" : ""].join(" "));
         row.append(element("span", name), element("span", goals.length ? String(goals[i]) : players.length === 1 ? "bye" : ""));
         pair.append(row);
       });
@@ -65,8 +65,9 @@ function standings({ table }) {
 function entry({ current, champion }) {
   const { now } = game;
   if (champion || !current) return [];
-  const names = element("p", current.players.join(" against "), "aim"), missing = now.seats.filter((seat) => !seat.taken);
-  if (now.seat === null) return [names];
+  const other = current.players.find((name) => name !== now.name), plays = now.seat !== null;
+  const names = element("p", plays ? `You play against ${other}.` : current.players.join(" against "), "aim"), missing = now.seats.filter((seat) => !seat.taken);
+  if (!plays) return [names];
   if (missing.length) return [names, element("p", `Waiting for ${missing[0].title}.`, "facts")];
   const go = button("Play", () => send("start"), "main");
   go.id = "go";
