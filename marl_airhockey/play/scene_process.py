@@ -13,7 +13,7 @@ from marl_airhockey.sim.backends.robosuite.frames import TableFrame
 
 WIDTH, HEIGHT, QUALITY = 640, 400, 80
 """Size of the images, pixels, and their JPEG quality."""
-FINER = 1.25
+FINER = 1.5
 """Factor of the size in which images are rendered, so that edges are smooth."""
 POLITE = 5
 """Niceness of the process; the loop of ticks has precedence."""
@@ -52,16 +52,15 @@ def _render(model: Any, frame: TableFrame, pipe: Connection) -> None:
         OSError: The other end of the pipe is closed while this process sends.
         RuntimeError: OpenGL is missing.
     """
-    from marl_airhockey.sim.backends.robosuite.light_model import make_light
+    from marl_airhockey.sim.backends.robosuite.light_model import SHADOW, make_light
     from marl_airhockey.sim.backends.robosuite.offscreen import (
         OffscreenRenderer,
         whole_table,
     )
 
     make_light(model)
-    renderer = OffscreenRenderer(
-        model, frame, round(FINER * WIDTH), round(FINER * HEIGHT)
-    )
+    size = round(FINER * WIDTH), round(FINER * HEIGHT)
+    renderer = OffscreenRenderer(model, frame, *size, SHADOW)
     camera = whole_table(model)
     while (request := pipe.recv()) is not None:
         large = renderer.picture(request[0], camera, request[1])

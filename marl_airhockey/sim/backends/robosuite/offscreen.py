@@ -51,18 +51,26 @@ class OffscreenRenderer:
         frame: Frame of the table.
         width: Width of the images, pixels.
         height: Height of the images, pixels.
+        shadows: Resolution of shadows, pixels.
 
     Raises:
         RuntimeError: OpenGL is missing. The message names the packages to install.
     """
 
-    def __init__(self, model: Any, frame: TableFrame, width: int, height: int) -> None:
+    def __init__(
+        self,
+        model: Any,
+        frame: TableFrame,
+        width: int,
+        height: int,
+        shadows: int = SHADOWS,
+    ) -> None:
         self._frame, self._model = frame, model
         self._data = mujoco.MjData(model)
         # The offscreen buffer of the model limits the size of the images.
         model.vis.global_.offwidth = max(model.vis.global_.offwidth, width)
         model.vis.global_.offheight = max(model.vis.global_.offheight, height)
-        model.vis.quality.shadowsize = SHADOWS
+        model.vis.quality.shadowsize = shadows
         try:
             self._renderer = mujoco.Renderer(model, height, width)
         except Exception as error:
