@@ -131,10 +131,12 @@ def lab_plant(operator: str) -> Iterator[Plant]:
 
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
-    yield Plant(FAULTS, switch, lambda: active)
-    ended.set()
-    watcher.join()
-    client.close()
+    try:
+        yield Plant(FAULTS, switch, lambda: active)
+    finally:
+        ended.set()
+        watcher.join()
+        client.close()
 
 
 def show(recording: Path, host: str, port: int, browser: bool) -> None:

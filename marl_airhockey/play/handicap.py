@@ -69,7 +69,7 @@ class Handicap:
 
 @dataclass
 class HandicappedDriver(Driver):
-    """Driver that observes late and with errors, and moves slowly.
+    """Driver that observes with latency and errors, and moves slowly.
 
     Its own paddle is observed without additional latency. It has the control_dt of the
     other driver. If the other driver has none, it has the control_dt of its training,

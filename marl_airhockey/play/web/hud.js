@@ -1,4 +1,4 @@
-// What stands above and below the table during play: score, time, link.
+// Score, time and link, above and below the table during play.
 
 import { colourOf } from "./colours.js";
 import { steering } from "./input.js";

@@ -93,6 +93,7 @@ def test_who_is_elsewhere_watches_and_nobody_is_erratic(match):
     with pytest.raises(ValueError, match="noise"):
         match.set_driver(0, "juggler", Handicap(noise=0.1))
     described = session.describe()
+    assert described["checkpoints"] == [], "no page changes the driver of an arm"
     assert described["camera"]
     assert list(described["faults"]) == ["dark_camera"]
 
