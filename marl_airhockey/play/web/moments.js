@@ -29,19 +29,24 @@ function begin(line, k, before, at) {
   const frames = recent.filter((frame) => frame.time > before.time - CLIP);
   if (!frames.length) frames.push(before);
   const last = frames.at(-1), speed = Math.max(...frames.map((frame) => Math.hypot(frame.pucks[k][2], frame.pucks[k][3])));
-  frames.push(...into(last, k));
+  frames.push(...into(last, k, game.match.goal_lines[line].ends));
   const scorer = scorerOf(line), mine = scoredForMe(line);
   const clip = { frames, speed, scorer, mine, score: game.now.caption, colour: colourOf(scorer) };
   current = clip; began = at;
   if (mine && (!best || speed > best.speed)) best = clip;
 }
 
-// The puck rolls on into the goal for a moment, because the frame of the goal may serve it again.
-function into(last, k) {
-  return [1, 2, 3].map((i) => ({
-    ...last, n: last.n + i, time: last.time + i / 60,
-    pucks: last.pucks.map((p, j) => (j === k ? [p[0] + (i * p[2]) / 60, p[1] + (i * p[3]) / 60, p[2], p[3]] : p)),
-  }));
+// The puck rolls on between the posts for a moment, because the frame of the goal may serve it again.
+function into(last, k, [[x, y], [u, v]]) {
+  const width = Math.hypot(u - x, v - y), along = [(u - x) / width, (v - y) / width];
+  const radius = game.match.puck_radius, [px, py, vx, vy] = last.pucks[k];
+  return [1, 2, 3].map((i) => {
+    const p = [px + (i * vx) / 60, py + (i * vy) / 60];
+    const place = (p[0] - x) * along[0] + (p[1] - y) * along[1];
+    const aside = Math.min(Math.max(place, radius), width - radius) - place;
+    const puck = [p[0] + aside * along[0], p[1] + aside * along[1], vx, vy];
+    return { ...last, n: last.n + i, time: last.time + i / 60, pucks: last.pucks.map((other, j) => (j === k ? puck : other)) };
+  });
 }
 
 export function skip() { current = null; }
