@@ -200,14 +200,18 @@ class RealBackend(LiveBackend):
 
     def _trouble(self, now: float) -> str:
         """Return the reason why the episode cannot continue; "" if it can."""
+        return self._robot_trouble() or (
+            self._blindness(now) if self.scene.pucks else ""
+        )
+
+    def _robot_trouble(self) -> str:
+        """Return the reason why the robot does not follow commands; "" if it does."""
         robot = self.robot
         # A HOLD because commands were late ends with the next command.
         held = robot.state is DriverState.HOLD and robot.fault in LATCHED
         if held or robot.state is DriverState.FAULT:
             return f"robot: {robot.fault.label}"
-        if not robot.is_connected:
-            return "robot: its driver has ended"
-        return self._blindness(now) if self.scene.pucks else ""
+        return "" if robot.is_connected else "robot: its driver has ended"
 
     def _blindness(self, now: float) -> str:
         """Return the reason why the puck's state is not known; "" if it is."""
@@ -251,6 +255,7 @@ class RealBackend(LiveBackend):
             "moment": self._moment,
             "robot": self.robot.state.name,
             "fault": self.robot.fault.label,
+            "trouble": self._robot_trouble(),
             "asked": [round(float(x), 4) for x in self._commanded],
             "sent": [round(status.sent_vx, 4), round(status.sent_vy, 4)],
             "sent_position": [round(status.sent_x, 4), round(status.sent_y, 4)],

@@ -82,11 +82,11 @@ export function updateArm() {
   }));
 }
 
-// The fault of the robot, which is more important than an invitation to start; "" for none.
+// Why an episode cannot start, which is more important than an invitation to start; "" if it can.
 export function robotFault() {
   const { table } = game.now;
   if (!game.match.camera || !table) return "";
-  return table.fault !== "none" ? table.fault : table.camera || "";
+  return table.trouble || table.camera || "";
 }
 
 // Why a paddle that a person moves rests; "" if none does.
