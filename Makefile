@@ -36,7 +36,7 @@ $(TRAINS): pyproject.toml constraints.txt
 
 # robosuite comes without what it names: that is numpy 1, a second OpenCV and a compiler.
 $(READY): $(TRAINS)
-	$(PIP) 'marl_airhockey[train,play,hardware,offline,ecosystem,dev]'
+	$(PIP) 'marl_airhockey[train,play,hardware,offline,ecosystem,export,dev]'
 	$(PIP) --no-deps robosuite
 	$(PIP) mujoco scipy termcolor tqdm
 	@echo "what pip says of robosuite above does no harm: it comes without what it names"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.toolkit import Array, Driver, View
+from marl_airhockey.toolkit import Array, Driver, View, length
 
 DEAD = 0.12
 """Dead zone of the stick, as a share of full tilt."""
@@ -29,7 +29,7 @@ class Gamepad(Driver):
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        tilt = np.hypot(*self.stick)
+        tilt = float(length(np.array(self.stick)))
         # The speed increases from 0 at the edge of the dead zone.
         live = max(min(tilt, 1.0) - DEAD, 0.0) / (1.0 - DEAD) / max(tilt, 1e-9)
         action = live * np.array(self.stick)

@@ -24,8 +24,10 @@ from marl_airhockey.toolkit import (
     Transition,
     Weight,
     observables,
+    products,
     rewards,
     serves,
+    sin,
 )
 
 START = 0.7
@@ -74,7 +76,7 @@ class FreeForAll(Scenario):
         super().__post_init__()
         if self.sides < 3:
             raise ValueError(f"sides: {self.sides}; expected at least 3")
-        between = START * self.table_geometry.offsets[0] * np.sin(np.pi / self.sides)
+        between = START * self.table_geometry.offsets[0] * sin(np.pi / self.sides)
         if between < self.table_geometry.paddle_radius:
             raise ValueError(
                 f"sides: {self.sides} paddles overlap at the start; choose an inradius "
@@ -107,7 +109,7 @@ class FreeForAll(Scenario):
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
         worlds = len(rng)
         # The puck moves toward the side that it was served to.
-        nearing = -state.puck_velocity[:, 0] @ self.table_geometry.normals.T
+        nearing = products(-state.puck_velocity[:, 0], self.table_geometry.normals)
         return {
             **super().initial_memory(state, rng),
             "lives": np.full((worlds, self.sides), float(self.lives)),

@@ -21,6 +21,7 @@ from marl_airhockey.toolkit import (
     Speed,
     State,
     Transition,
+    exp,
     length,
     observables,
     rewards,
@@ -101,8 +102,8 @@ class HitGoalVelocity(FewShots, GoalScenario):
             self.speed_share,
             self.speed_slack,
         )
-        near = np.exp(-4.0 * np.maximum(gap, 0.0))
-        score = (near * (0.3 + 0.7 * np.exp(-1.5 * error))).max(-1)
+        near = exp(-4.0 * np.maximum(gap, 0.0))
+        score = (near * (0.3 + 0.7 * exp(-1.5 * error))).max(-1)
         return {
             "gap": rewards.nearest(t),
             "score": np.maximum(t.memory["score"], score),

@@ -147,7 +147,7 @@ class MoveBlock(FewShots):
         It must move so far in one step. The published code measures the displacement
         since the start. The cause does not matter.
         """
-        least = np.hypot(*self.table_geometry.size) / 5000
+        least = length(self.table_geometry.size) / 5000
         moved = length(t.after.block[..., 0, :] - t.before.block[..., 0, :]) > least
         return np.asarray(moved & (t.after.time > 0.25))
 

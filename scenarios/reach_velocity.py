@@ -20,8 +20,10 @@ from marl_airhockey.toolkit import (
     Speed,
     State,
     Transition,
+    cos,
     length,
     observables,
+    sin,
     starts,
 )
 from marl_airhockey.toolkit.rewards import tolerance
@@ -73,7 +75,7 @@ class ReachVelocity(GoalScenario):
         goal = starts.inside(rng, self.scene, 0, self.margin)
         angle = rng.uniform(-np.pi, np.pi)
         speed = rng.uniform(self.slow, self.fast)[:, None]
-        velocity = speed * np.stack([np.cos(angle), np.sin(angle)], -1)
+        velocity = speed * np.stack([cos(angle), sin(angle)], -1)
         gap = length(state.paddle[:, 0] - goal)
         worlds = len(rng)
         return {
@@ -141,7 +143,7 @@ class ReachVelocity(GoalScenario):
         cosine = (velocity * wanted).sum(-1) / (speed * wanted_speed + 1e-8)
         alike = 1 - np.abs(speed - wanted_speed) / np.sqrt(8.0)
         score = ((1 + cosine) / 2 + alike) / 2
-        tenth = 0.1 * np.hypot(*self.table_geometry.size)
+        tenth = 0.1 * length(self.table_geometry.size)
         return np.asarray((gap <= tenth) & (score >= 0.8))
 
     @property

@@ -138,7 +138,7 @@ class StrikeCrowd(Scenario):
     def paper_success(self, t: Transition) -> Array:
         """(...) bool: After 0.15 s, displacements sum to a tenth of the diagonal."""
         spread = length(t.after.block - t.memory["origin"]).sum(-1)
-        tenth = 0.1 * np.hypot(*self.table_geometry.size)
+        tenth = 0.1 * length(self.table_geometry.size)
         return np.asarray((spread > tenth) & (t.after.time > 0.15))
 
     def caption(self, memory: Memory) -> str:

@@ -44,6 +44,19 @@ LONG = {
     "sim/world/world.py": "one class, which all environments are views of",
 }
 """Reasons of the files that are longer"""
+INEXACT = {
+    *("sin", "cos", "tan", "arcsin", "arccos", "arctan", "arctan2", "atan2", "tanh"),
+    *("exp", "exp2", "expm1", "log", "log1p", "log2", "log10", "hypot", "cbrt"),
+    *("power", "float_power", "pow", "linalg", "dot", "vdot", "inner", "einsum"),
+    *("interp", "convolve", "tensordot", "matmul"),
+}
+"""Functions of NumPy and math that `sim.jit.elementary` and `geometry` replace"""
+OTHER_RESULTS = (
+    *("marl_airhockey/sim/render/", "marl_airhockey/sim/backends/robosuite/"),
+    *("marl_airhockey/sim/backends/pymunk/", "marl_airhockey/sim/jit/elementary.py"),
+    *("marl_airhockey/sim/jit/tracer.py", "marl_airhockey/sim/core/geometry.py"),
+)
+"""Files without claims to equal bits, and those that define such functions"""
 PRIVATE_WORDS = {"told", "shut", "turn", "turns", "turned", "court", "ledger", "chain"}
 
 
@@ -89,6 +102,23 @@ def test_nothing_uses_a_global_random_generator():
     texts = {path: path.read_text() for path in SOURCES}
     found = [f"{p}: {word}" for p, t in texts.items() for word in banned if word in t]
     assert not found
+
+
+def depends_on_the_machine(node):
+    """True for an operation whose last bits depend on the processor or the system."""
+    if isinstance(node, ast.BinOp):
+        return isinstance(node.op, ast.MatMult)
+    named = isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
+    return named and node.value.id in ("np", "math") and node.attr in INEXACT
+
+
+def test_simulation_and_rules_use_operations_with_the_same_bits_everywhere():
+    folders = [PACKAGE / "sim", PACKAGE / "toolkit", *LEAVES]
+    for path in (path for folder in folders for path in folder.rglob("*.py")):
+        inside = str(path.relative_to(PACKAGE.parent))
+        if not inside.startswith(OTHER_RESULTS):
+            for node in ast.walk(ast.parse(path.read_text())):
+                assert not depends_on_the_machine(node), f"{path}: {ast.unparse(node)}"
 
 
 def own_names(path):

@@ -17,6 +17,7 @@ from marl_airhockey.cli import (
     demo,
     evaluate,
     export,
+    export_code,
     fit,
     lab,
     league,
@@ -30,6 +31,7 @@ from marl_airhockey.cli import (
     transfer,
     trials,
     ur_emulator,
+    verify,
     watch,
 )
 from marl_airhockey.cli.calibrate import arm, camera, delay
@@ -58,6 +60,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "crossplay": crossplay.crossplay,
     "challenge": challenge.challenge,
     "export": export.export,
+    "export-code": export_code.export_code,
     "demo": demo.demo,
     "transfer": transfer.transfer,
     "fit": fit.fit,
@@ -66,6 +69,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "teleop": teleop.teleop,
     "bench": bench.bench_environments,
     "precompile": precompile.precompile,
+    "verify": verify.verify,
     "new": new.new,
 }
 """Function of each command, by name."""

@@ -8,12 +8,13 @@ import math
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
 
+from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:
@@ -24,7 +25,8 @@ LARGEST = 64_000_000
 MOST = 100
 """Largest number of arrays in a file."""
 FEW_ROWS = 8
-"""Largest number of inputs for which BLAS uses one thread anyway."""
+"""Largest number of inputs whose outputs are the same bits on every machine. Larger
+batches use BLAS, which is faster and whose sums depend on the processor."""
 
 
 @cache
@@ -59,19 +61,33 @@ class NumpyNetwork:
 
     def forward(self, inputs: Array) -> Array:
         """Return the outputs (B, out) of the last layer for inputs (B, D)."""
-        if len(inputs) <= FEW_ROWS:
-            return self._forward(inputs)
-        # Threads of BLAS busy-wait for each other. For layers of this size they need
-        # twice the CPU time on two cores, and more on more cores.
-        with _blas().limit(limits=1, user_api="blas"):
-            return self._forward(inputs)
-
-    def _forward(self, inputs: Array) -> Array:
         if inputs.shape[-1:] != self.centre.shape:
             raise ValueError(
                 f"observations of shape (B, {len(self.centre)}) are expected, got "
                 f"{inputs.shape}"
             )
+        if len(inputs) <= FEW_ROWS:
+            numbers, sizes = self._flat
+            kind = np.result_type(inputs, numbers)
+            out = np.empty((len(inputs), sizes[-1]), kind)
+            work = np.empty((2, sizes.max()), kind)
+            _forward(np.ascontiguousarray(inputs), numbers, sizes, out, work)
+            return out
+        # Threads of BLAS busy-wait for each other. For layers of this size they need
+        # twice the CPU time on two cores, and more on more cores.
+        with _blas().limit(limits=1, user_api="blas"):
+            return self._by_blas(inputs)
+
+    @cached_property
+    def _flat(self) -> tuple[Array, Array]:
+        """Numbers and sizes of all layers, as `_forward` reads them."""
+        parts = [self.centre, self.unit]
+        for weight, bias in self.layers:
+            parts += [weight.T.reshape(-1), bias]
+        sizes = [len(self.centre), *(len(bias) for _, bias in self.layers)]
+        return np.concatenate(parts), np.array(sizes)
+
+    def _by_blas(self, inputs: Array) -> Array:
         x = (inputs - self.centre) / self.unit
         for weight, bias in self.layers[:-1]:
             x = np.maximum(x @ weight.T + bias, 0.0)
@@ -139,6 +155,44 @@ class NumpyNetwork:
             raise ValueError("a unit is 0")
         if not isinstance(self.card, Mapping):
             raise ValueError("its card is not an object")
+
+
+@compiled(nogil=True, error_model="numpy")
+def _forward(
+    inputs: Array, numbers: Array, sizes: Array, out: Array, work: Array
+) -> None:
+    """Fill the outputs of a network, with all sums in the order of the inputs.
+
+    Args:
+        inputs: Inputs (B, D).
+        numbers: Centre, unit, and for each layer weights (in, out) and biases, in one
+            row.
+        sizes: Number of inputs, and of outputs of each layer.
+        out: Outputs (B, out), filled.
+        work: Work space (2, n), where n is the largest size.
+    """
+    for b in range(len(inputs)):
+        k, at = 0, 2 * sizes[0]
+        for i in range(sizes[0]):
+            work[0, i] = (inputs[b, i] - numbers[i]) / numbers[sizes[0] + i]
+        for layer in range(1, len(sizes)):
+            before, after = work[k], work[1 - k]
+            n, m = sizes[layer - 1], sizes[layer]
+            for o in range(m):
+                after[o] = numbers[at + n * m + o]
+            for i in range(n):
+                # Half of the outputs of a layer are 0.
+                if before[i] != 0.0:
+                    for o in range(m):
+                        after[o] += numbers[at + i * m + o] * before[i]
+            at += n * m + m
+            k = 1 - k
+            for o in range(m):
+                if layer + 1 < len(sizes):
+                    if after[o] < 0.0:
+                        after[o] = 0.0
+                else:
+                    out[b, o] = after[o]
 
 
 def _read(path: Path) -> dict[str, Array]:

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from marl_airhockey.policies.numpy_network import NumpyNetwork
+from marl_airhockey.sim.jit.elementary import expm1
 from marl_airhockey.types import Array
 
 
@@ -39,7 +40,11 @@ class NumpyPolicy(NumpyNetwork):
             parts = ("observation", "achieved_goal", "desired_goal")
             observation = np.concatenate([observation[part] for part in parts], -1)
         action = self.forward(observation)
-        return np.asarray(np.tanh(action) if self.card.get("bounded") else action)
+        if not self.card.get("bounded"):
+            return action
+        # The hyperbolic tangent; NumPy's depends on the processor.
+        t = expm1(2.0 * np.clip(action, -20.0, 20.0))
+        return np.asarray(t / (t + 2.0), action.dtype)
 
     def _check(self) -> None:
         super()._check()

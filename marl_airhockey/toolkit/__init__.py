@@ -17,12 +17,13 @@ from marl_airhockey.sim.contracts.units import (
     Weight,
 )
 from marl_airhockey.sim.core.errors import require, unknown_name
-from marl_airhockey.sim.core.geometry import clip, length
+from marl_airhockey.sim.core.geometry import clip, length, products
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.scene import GoalLine, Scene
 from marl_airhockey.sim.core.seat import Seat
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.core.table import Obstacle, Table
+from marl_airhockey.sim.jit.elementary import cos, exp, expm1, hypot, log, log1p, sin
 from marl_airhockey.types import Array, Memory
 
 __all__ = [
@@ -52,7 +53,15 @@ __all__ = [
     "View",
     "Weight",
     "clip",
+    "cos",
+    "exp",
+    "expm1",
+    "hypot",
     "length",
+    "log",
+    "log1p",
+    "products",
     "require",
+    "sin",
     "unknown_name",
 ]

@@ -85,13 +85,12 @@ class OtherPaddles(Observable):
 
 def _others(scene: Scene) -> Array:
     """Return the indices (S, S - 1) of the other seats, teammates first."""
-    angles = np.arctan2(*scene.table.normals.T[::-1])
-    rows = []
+    sides, rows = len(scene.table.vertices), []
     for me, seat in enumerate(scene.seats):
         key = {
             k: (
                 other.team != seat.team,
-                float((angles[other.side] - angles[seat.side]) % (2 * np.pi)),
+                (other.side - seat.side) % sides,
                 k,
             )
             for k, other in enumerate(scene.seats)

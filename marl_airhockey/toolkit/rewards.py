@@ -14,6 +14,7 @@ from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.seat import reaches
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.core.touches import touched as touched
+from marl_airhockey.sim.jit.elementary import cos, exp
 from marl_airhockey.types import Array, Memory
 
 SLOW = 0.05
@@ -32,7 +33,7 @@ def tolerance(value: Array, bound: float, margin: float) -> Array:
         bound: Largest value with the result 1.
         margin: Excess over the bound with the result e^-1.
     """
-    return np.exp(-np.maximum(value - bound, 0.0) / margin)
+    return np.asarray(exp(-np.maximum(value - bound, 0.0) / margin))
 
 
 def nearest(t: Transition) -> Array:
@@ -77,7 +78,7 @@ def alike(
         slack: Additional error of the speed, m/s.
     """
     speed, aim = length(velocity), length(wanted)
-    along = (velocity * wanted).sum(-1) >= np.cos(angle) * speed * aim
+    along = (velocity * wanted).sum(-1) >= cos(angle) * speed * aim
     agree: Array = along & (np.abs(speed - aim) <= share * aim + slack)
     return agree
 
@@ -233,7 +234,7 @@ def on_goal(scene: Scene, state: State, seat: int) -> Array:
         raise ValueError(f"seat {seat}: its side has no goal with a width")
     normal, offset = scene.table.normals[side], scene.table.offsets[side]
     along = np.array([-normal[1], normal[0]])
-    middle = sum(scene.table.ends(side)) @ along / 2.0
+    middle = (sum(scene.table.ends(side)) * along).sum() / 2.0
     place, motion = state.puck, state.puck_velocity
     nearing = -(motion * normal).sum(-1)
     due = ((place * normal).sum(-1) + offset) / np.maximum(nearing, 1e-6)

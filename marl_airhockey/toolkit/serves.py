@@ -12,6 +12,7 @@ from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.seat import ReachPlanes
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.jit.cache import compiled
+from marl_airhockey.sim.jit.elementary import cos, sin
 from marl_airhockey.toolkit.starts import SPIN
 from marl_airhockey.types import Array
 
@@ -160,7 +161,7 @@ def _serve(
                 break
         position[w, body, 0] = tried[chosen, 0]
         position[w, body, 1] = tried[chosen, 1]
-        velocity[w, body, 0] = SPEED * np.cos(heading[w])
-        velocity[w, body, 1] = SPEED * np.sin(heading[w])
+        velocity[w, body, 0] = SPEED * cos(heading[w])
+        velocity[w, body, 1] = SPEED * sin(heading[w])
         spin[w, body] = edge[w] * SPEED / radius[body]
         touching[w, :, puck] = False

@@ -15,6 +15,7 @@ from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.core.table import Table
 from marl_airhockey.sim.jit.cache import compiled
+from marl_airhockey.sim.jit.elementary import cos, sin
 from marl_airhockey.toolkit.starts import falling_puck, redraw, roll
 from marl_airhockey.types import Array
 
@@ -148,7 +149,7 @@ def _strike(
     height, angle, table = draws[:, 0], draws[:, 1], scene.table
     below = falls[worlds, :, 0] <= height[:, None]
     struck = falls[worlds, below.argmax(-1)]
-    normal = np.stack([np.cos(angle), np.sin(angle)], -1)
+    normal = np.stack([cos(angle), sin(angle)], -1)
     paddle = struck[:, :2] - normal * (table.paddle_radius + table.puck_radius)
     low, high = Places.on(table).paddle
     legal = below.any(-1) & ((paddle >= low) & (paddle <= high)).all(-1)
@@ -180,7 +181,7 @@ def _hit(
 @compiled()
 def _choose(path: Array, end: float, goal: Array, choice: Array, moment: Array) -> None:
     """Choose a valid index of each rising path (W, T, 5); -1 if there is none."""
-    steep = np.tan(np.radians(30.0))
+    steep = np.sqrt(1.0 / 3.0)
     for w in range(len(path)):
         good, moment[w] = 0, -1
         # Two passes: the first counts the valid indices, the second chooses one.

@@ -8,13 +8,14 @@ from functools import cache
 
 import numpy as np
 
-from marl_airhockey.sim.core.geometry import half_planes
+from marl_airhockey.sim.core.geometry import half_planes, length, products
 from marl_airhockey.sim.core.laws import fly, impulse, wall_restitution
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.core.table import GRAVITY, Table
 from marl_airhockey.sim.jit.cache import compiled
+from marl_airhockey.sim.jit.elementary import sin
 from marl_airhockey.types import Array
 
 PADDLE_X = (-0.70, -0.60)
@@ -106,7 +107,7 @@ def falling(rng: RandomStreams, scene: Scene) -> State:
         others = state.position[:, first:k]
 
         def apart(rows: Array, others: Array = others) -> Array:
-            gap = np.linalg.norm(rows[:, None, :2] - others, axis=-1)
+            gap = length(rows[:, None, :2] - others)
             return np.asarray((gap > 3 * radius).all(-1))
 
         if k > first:
@@ -118,8 +119,7 @@ def falling(rng: RandomStreams, scene: Scene) -> State:
 
 def puck_gap(state: State) -> Array:
     """Return the distance from paddle 0 to puck 0 (W,), m."""
-    gap = state.puck[:, 0] - state.paddle[:, 0]
-    return np.asarray(np.hypot(gap[:, 0], gap[:, 1]))
+    return length(state.puck[:, 0] - state.paddle[:, 0])
 
 
 def roll(
@@ -146,7 +146,7 @@ def roll(
         "wall_friction",
     )
     tilts = (np.radians(physics[name]) for name in ("tilt", "cross_tilt"))
-    pulls = (-GRAVITY * np.sin(tilt) for tilt in tilts)
+    pulls = (-GRAVITY * sin(tilt) for tilt in tilts)
     columns = [*pulls, *(physics[name] for name in names)]
     laws = np.empty((len(start), len(columns)))
     for k, column in enumerate(columns):
@@ -192,10 +192,10 @@ def inside(rng: RandomStreams, scene: Scene, seat: int, margin: float = 0.0) -> 
         return some.uniform(low, high, 2)
 
     def fits(points: Array) -> Array:
-        return np.asarray((points @ normals.T + offsets >= margin).all(-1))
+        return np.asarray((products(points, normals) + offsets >= margin).all(-1))
 
     ego = redraw(rng, sample, fits)
-    return np.asarray(ego @ scene.table.rotation(scene.seats[seat].side))
+    return products(ego, scene.table.rotation(scene.seats[seat].side).T)
 
 
 NARROW_TRIES = 50

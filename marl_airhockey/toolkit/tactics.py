@@ -14,7 +14,7 @@ import numpy as np
 from marl_airhockey.sim.contracts.driver import Driver, View
 from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.sim.core.extrapolation import Walls, extrapolate_rows
-from marl_airhockey.sim.core.geometry import length
+from marl_airhockey.sim.core.geometry import length, products
 from marl_airhockey.sim.core.laws import impulse
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.jit.cache import compiled, inner
@@ -91,13 +91,13 @@ class Field:
                 keep = goal_line.width / 2
                 continue
             start, end = table.ends(goal_line.side)
-            along = (end - start) / np.linalg.norm(end - start)
+            along = (end - start) / length(end - start)
             spread = max(goal_line.width / 2 - 1.2 * table.puck_radius, 0.0)
             middle = (start + end) / 2
             points += [middle + share * spread * along for share in (-1.0, 0.0, 1.0)]
         box = len(table.vertices) == 4 and me.side in (0, 2)
         half = float(table.size[1]) / 2 - table.puck_radius if box else np.inf
-        targets = np.array(points).reshape(-1, 2) @ rotation.T
+        targets = products(np.array(points).reshape(-1, 2), rotation)
         edge = -float(table.offsets[me.side])
         return Field(edge, half, keep, targets, Walls.of(scene).rotated(rotation))
 

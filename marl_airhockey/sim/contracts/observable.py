@@ -14,6 +14,7 @@ import numpy as np
 
 from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.sim.core.extrapolation import Walls, extrapolate
+from marl_airhockey.sim.core.geometry import products
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array, Memory
@@ -67,7 +68,7 @@ class ObservationContext:
     def extent(self) -> Array:
         """Largest |x| and |y| of the table in any seat's ego frame (2,), m."""
         corners = np.asarray(self.scene.table.vertices)
-        rotated = [corners @ r.T for r in self.rotations]
+        rotated = [products(corners, r) for r in self.rotations]
         return np.asarray(np.max(np.abs(rotated), axis=(0, 1)))
 
     @cached_property
@@ -153,8 +154,7 @@ class EgoView:
         seats = vectors[..., None, :, :]
         if self.scope.straight:
             return seats
-        rotated: Array = seats @ self.scope.rotations.swapaxes(-1, -2)
-        return rotated
+        return products(seats, self.scope.rotations[:, None])
 
     @property
     def puck_predicted(self) -> tuple[Array, Array]:

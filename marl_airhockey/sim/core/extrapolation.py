@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from marl_airhockey.sim.core.geometry import products
 from marl_airhockey.sim.core.parameters import PARAMETERS
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.jit.cache import compiled
@@ -42,7 +43,7 @@ class Walls:
 
     def rotated(self, rotation: Array) -> Walls:
         """Return the walls in a frame that is rotated about the origin."""
-        normals = self.normals @ rotation.T
+        normals = products(self.normals, rotation)
         return Walls(normals, self.offsets, self.restitution, self.friction)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.sim.core.parameters import PUCK_SPEED_CAP, SLOWEST_BOUNCE
 from marl_airhockey.sim.jit.cache import compiled, inner
+from marl_airhockey.sim.jit.elementary import expm1, log, log1p
 from marl_airhockey.types import Array
 
 Motion = tuple[float, float, float, float]
@@ -37,7 +38,7 @@ def fly(
         damping: Linear drag, 1/s.
         drag: Quadratic drag, 1/m.
     """
-    time = -np.expm1(-damping * h) / damping if damping > 0.0 else h
+    time = -expm1(-damping * h) / damping if damping > 0.0 else h
     return fly_slowed(vx, vy, h, time, gx, gy, damping, drag)
 
 
@@ -61,7 +62,7 @@ def fly_slowed(
             # The series of ln(1 + z) / z is as exact and faster.
             way = 1 - z * (0.5 - z * (1 / 3 - z * (0.25 - z * (0.2 - z / 6))))
         else:
-            way = np.log1p(z) / z
+            way = log1p(z) / z
         way *= time
         left = (1.0 - damping * time) / (1.0 + z)
     return ux * way, uy * way, ux * left + 0.5 * gx * h, uy * left + 0.5 * gy * h
@@ -109,7 +110,7 @@ def wall_restitution(speed: float, at_one: float, slope: float) -> float:
         at_one: Restitution at 1 m/s.
         slope: Loss of restitution per ln(m/s).
     """
-    share = at_one - slope * np.log(max(speed, SLOWEST_BOUNCE))
+    share = at_one - slope * log(max(speed, SLOWEST_BOUNCE))
     return float(min(max(share, 0.0), 1.0))
 
 

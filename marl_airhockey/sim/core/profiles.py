@@ -17,6 +17,7 @@ import numpy as np
 
 from marl_airhockey.sim.core.checks import build, check_fields
 from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.core.geometry import interpolate
 from marl_airhockey.sim.core.parameters import parameter_range
 from marl_airhockey.types import Array
 
@@ -40,7 +41,7 @@ class CorrelatedParameter:
 
     def at_value(self, other: Array, unit: Array) -> Array:
         """Return values (W,), given the other parameter and numbers in [0, 1)."""
-        line = np.interp(other, self.at, self.values)
+        line = interpolate(other, self.at, self.values)
         return np.asarray(line + self.spread * (2.0 * unit - 1.0))
 
     @property

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.sim.jit.cache import compiled, inner
+from marl_airhockey.sim.jit.elementary import cos, log1p, sin
 from marl_airhockey.types import Array
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -58,8 +59,8 @@ def _unit(keys: Array, counts: Array, rows: Array, out: Array) -> None:
 @inner(error_model="numpy")
 def normal_pair(first: float, second: float) -> tuple[float, float]:
     """Return two standard normal numbers, given two uniform ones (Box and Muller)."""
-    radius, phase = math.sqrt(-2.0 * math.log1p(-first)), 2.0 * math.pi * second
-    return radius * math.cos(phase), radius * math.sin(phase)
+    radius, phase = math.sqrt(-2.0 * log1p(-first)), 2.0 * math.pi * second
+    return radius * cos(phase), radius * sin(phase)
 
 
 def _is_seed(value: Any) -> bool:
@@ -145,8 +146,8 @@ class RandomStreams:
     def normal(self, *shape: int) -> Array:
         """Sample (W, *shape) standard normal numbers (Box and Muller's transform)."""
         pair = self.units(2, *shape)
-        radius = np.sqrt(-2.0 * np.log1p(-pair[:, 0]))
-        return np.asarray(radius * np.cos(2.0 * np.pi * pair[:, 1]))
+        radius = np.sqrt(-2.0 * log1p(-pair[:, 0]))
+        return np.asarray(radius * cos(2.0 * np.pi * pair[:, 1]))
 
 
 class StreamSet:

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from marl_airhockey.sim.core.geometry import length
 from marl_airhockey.sim.core.seat import Seat
 from marl_airhockey.sim.core.state import Bodies, State
 from marl_airhockey.sim.core.table import Obstacle, Table
@@ -72,7 +73,7 @@ class Scene:
         start, end = self.table.ends(goal_line.side)
         if goal_line.width is None:
             return np.array([start, end])
-        along = (end - start) / np.linalg.norm(end - start) * goal_line.width / 2
+        along = (end - start) / length(end - start) * goal_line.width / 2
         middle = (start + end) / 2
         return np.array([middle - along, middle + along])
 

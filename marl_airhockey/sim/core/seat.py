@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from marl_airhockey.sim.core.geometry import clip, half_planes
+from marl_airhockey.sim.core.geometry import clip, half_planes, length, products
 from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
@@ -56,12 +56,16 @@ def make_seat(
     # The order starts at the own side, so opposite seats have the same numbers.
     count = len(table.vertices)
     order = [(side + k) % count for k in range(count)]
-    normals = table.normals @ ego
+    normals = products(table.normals, ego.T)
     if kind == "robot":
         polygon, speed, acceleration = np.array(table.robot_reach), 0.7, 7.0
         polygon[:, 0] += edge
     else:
-        polygon, speed, acceleration = np.array(table.vertices)[order] @ ego, 5.0, 50.0
+        polygon, speed, acceleration = (
+            products(np.array(table.vertices)[order], ego.T),
+            5.0,
+            50.0,
+        )
     for k in order:
         polygon = clip(polygon, normals[k], table.offsets[k] - table.paddle_radius)
     own = np.array([1.0, 0.0])
@@ -69,8 +73,8 @@ def make_seat(
     for other in rivals:
         # Points nearer to the own side than to the other, less the paddle's radius.
         toward, gap = normals[other] - own, table.offsets[other] - table.offsets[side]
-        length = np.linalg.norm(toward)
-        polygon = clip(polygon, toward / length, gap / length - table.paddle_radius)
+        size = float(length(toward))
+        polygon = clip(polygon, toward / size, gap / size - table.paddle_radius)
     if not rivals and kind == "arcade":
         polygon = clip(polygon, -own, -table.paddle_radius)
     reach = tuple((float(x), float(y)) for x, y in polygon)
@@ -90,7 +94,7 @@ def reaches(table: Table, seats: tuple[Seat, ...]) -> tuple[Array, Array]:
     normals = np.zeros((len(seats), edges, 2))
     offsets = np.full((len(seats), edges), np.inf)
     for s, (seat, (normal, offset)) in enumerate(zip(seats, planes, strict=True)):
-        normals[s, : len(offset)] = normal @ table.rotation(seat.side)
+        normals[s, : len(offset)] = products(normal, table.rotation(seat.side).T)
         offsets[s, : len(offset)] = offset
     return normals, offsets
 
@@ -129,7 +133,7 @@ class ReachPlanes:
         share, sharpest = np.ones(len(seats)), 1.0
         for s, seat in enumerate(seats):
             normal, _ = half_planes(seat.reach)
-            cosine = np.einsum("kd,kd->k", normal, np.roll(normal, -1, axis=0)).min()
+            cosine = (normal * np.roll(normal, -1, axis=0)).sum(-1).min()
             share[s] = np.sqrt((1 + cosine) / 2)
             sharpest = min(sharpest, cosine)
         rotation = np.array([table.rotation(seat.side) for seat in seats])

@@ -11,6 +11,7 @@ import numpy as np
 
 from marl_airhockey.sim.core.seat import ReachPlanes
 from marl_airhockey.sim.jit.cache import compiled
+from marl_airhockey.sim.jit.elementary import exp
 from marl_airhockey.sim.jit.pipeline import Fixed, Stage
 from marl_airhockey.types import Array
 
@@ -67,7 +68,7 @@ def _lag(
     answer = np.empty(2)
     for b in range(len(action)):
         w = HALF / time[b] if time[b] > 0.0 else np.inf
-        left = np.exp(-w * dt)
+        left = exp(-w * dt)
         for s in range(action.shape[1]):
             for axis in range(2):
                 answer[axis], new_rate[b, s, axis] = follow_ramp(

@@ -12,8 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.sim.core.geometry import _cross
+from marl_airhockey.sim.core.geometry import _cross, interpolate, length
 from marl_airhockey.sim.core.parameters import PRESETS
+from marl_airhockey.sim.jit.elementary import cos, sin
 from marl_airhockey.types import Array
 
 GRAVITY = 9.81
@@ -93,10 +94,10 @@ class Table:
     @staticmethod
     def regular(sides: int, inradius: float) -> Table:
         """Return a regular polygon with sides ``inradius`` m from the centre."""
-        radius = inradius / np.cos(np.pi / sides)
+        radius = inradius / cos(np.pi / sides)
         angles = np.pi - np.pi / sides + 2 * np.pi * np.arange(sides) / sides
         # Side 0 faces +x and is at x = -inradius, like home on a rectangle.
-        corners = radius * np.stack([np.cos(angles), np.sin(angles)], -1)
+        corners = radius * np.stack([cos(angles), sin(angles)], -1)
         return Table(tuple((float(x), float(y)) for x, y in corners))
 
     @cached_property
@@ -104,7 +105,7 @@ class Table:
         """Inward unit normals (sides, 2)."""
         corners = np.asarray(self.vertices, dtype=float)
         ahead = np.roll(corners, -1, axis=0) - corners
-        ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
+        ahead /= length(ahead)[:, None]
         return np.stack([-ahead[:, 1], ahead[:, 0]], -1)
 
     @cached_property
@@ -129,7 +130,7 @@ class Table:
         (x, width), (new_x, new_width) = _knots(TABLES["standard"]), _knots(self)
         if x == new_x and width == new_width:
             return points
-        along = np.interp(points[..., 0], x, new_x)
+        along = interpolate(points[..., 0], x, new_x)
         return np.stack([along, points[..., 1] * (new_width / width)], -1)
 
     def ends(self, side: int) -> tuple[Array, Array]:

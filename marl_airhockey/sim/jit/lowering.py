@@ -19,6 +19,8 @@ from numba.core.errors import NumbaError
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
+from marl_airhockey.sim.jit.elementary import ELEMENTARY
+
 Argument = int | tuple[Any]
 """Index of an earlier operation, or a number in a tuple."""
 Operation = tuple[Any, ...]
@@ -131,6 +133,8 @@ class _Row:
             done = self._select(condition, args[1], args[0])
         elif name in OPERATORS and not (truths and name in ("add", "multiply")):
             done = self._call(OPERATORS[name], *args)
+        elif name in ELEMENTARY:
+            done = self._call(ELEMENTARY[name], *args)
         elif isinstance(getattr(np, name), np.ufunc):
             done = self._call(getattr(np, name), *args)
         else:
@@ -180,4 +184,7 @@ class _Row:
         signature, translate = self._known[key]
         given = zip(args, signature.args, strict=True)
         values = [self._cast(value, kind).llvm for value, kind in given]
+        # The functions of `elementary` are linked, those of numba have no libraries.
+        for library in getattr(translate, "libs", ()):
+            self._context.active_code_library.add_linking_library(library)
         return Value(signature.return_type, translate(self._builder, values))

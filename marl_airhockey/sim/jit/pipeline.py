@@ -80,19 +80,19 @@ class Pipeline:
     """
 
     def __init__(self, rows: int, stages: Sequence[Stage], name: str) -> None:
-        self._parts: list[Stage | _Compiled] = []
+        self.parts: list[Stage | CompiledPart] = []
         # Generated loops are compiled separately, so similar scenes share other code.
         for (compiled, _), group in groupby(stages, _kind):
             part = list(group)
             if compiled:
-                self._parts.append(_Compiled(rows, part, name))
+                self.parts.append(CompiledPart(rows, part, name))
             else:
-                self._parts.extend(part)
+                self.parts.extend(part)
 
     def __call__(self) -> bool:
         """Call the stages in order; return False and skip the rest if one stops."""
         # A generator would cost more than the calls.
-        for part in self._parts:  # noqa: SIM110
+        for part in self.parts:  # noqa: SIM110
             if not part():
                 return False
         return True
@@ -102,28 +102,32 @@ def _kind(stage: Stage) -> tuple[bool, bool]:
     return stage.compiled, stage.generated
 
 
-class _Compiled:
+class CompiledPart:
     """Stages as one compiled function. Several threads can share its rows."""
 
     def __init__(self, rows: int, stages: Sequence[Stage], name: str) -> None:
         inputs = _Inputs()
         source = _source(stages, inputs)
-        self._rows, self._inputs = rows, inputs
-        self._where = np.array(inputs.values, np.int64)
+        self._rows = rows
+        self.where = np.array(inputs.values, np.int64)
+        """Addresses and lengths of arrays, the argument of the function."""
+        self.arrays = inputs.arrays
+        """Arrays by the index of their address in ``where``."""
         self._strides = np.array(inputs.strides, np.int64)
         functions: dict[str, Any] = {"pointer": pointer}
         functions |= {f"f{i}": stage.function for i, stage in enumerate(stages)}
-        self._kernel = load(source, name, functions).kernel
+        self.kernel: Any = load(source, name, functions).kernel
+        """Compiled function of ``where`` and the number of rows."""
 
     def __call__(self) -> bool:
         if self._rows < 2 * LEAST:
-            return bool(self._kernel(self._where, self._rows))
+            return bool(self.kernel(self.where, self._rows))
         going: list[bool] = []
 
         def work(rows: slice) -> None:
             first, end, _ = rows.indices(self._rows)
-            where = self._where + first * self._strides
-            going.append(bool(self._kernel(where, end - first)))
+            where = self.where + first * self._strides
+            going.append(bool(self.kernel(where, end - first)))
 
         over_rows(work, self._rows)
         return all(going)
@@ -139,13 +143,13 @@ class _Inputs:
         self.values: list[int] = []
         self.strides: list[int] = []
         """Increase of each value from one world to the next."""
-        self._arrays: list[Array] = []
-        """Arrays, stored because the addresses refer to them."""
+        self.arrays: dict[int, Array] = {}
+        """Arrays by the index of their address; stored so that they stay there."""
 
     def array(self, array: Array, shared: bool) -> str:
         """Return the expression of an array, whose rows are worlds unless shared."""
         assert array.flags.c_contiguous, "rows must be contiguous"
-        self._arrays.append(array)
+        self.arrays[len(self.values)] = array
         address = self.number(array.ctypes.data, 0 if shared else array.strides[0])
         axes = [self.number(length) for length in array.shape[not shared :]]
         shape = ", ".join(axes if shared else ["n", *axes])

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from marl_airhockey.sim.jit.elementary import ELEMENTARY
 from marl_airhockey.types import Array
 
 Scalar = Any
@@ -73,6 +74,7 @@ class Tape:
 def _apply(op: str, function: Callable[..., Any], *args: Scalar) -> Scalar:
     """Apply an operation to scalars; return a number if all are known, or a symbol."""
     values = [a.value if isinstance(a, Symbol) else a for a in args]
+    function = ELEMENTARY.get(op, function)
     with np.errstate(all="ignore"):
         value = np.asarray(function(*values))[()]
     for arg in args:

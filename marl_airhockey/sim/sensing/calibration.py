@@ -8,6 +8,7 @@ import numpy as np
 
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.jit.cache import compiled
+from marl_airhockey.sim.jit.elementary import cos, sin
 from marl_airhockey.types import Array
 
 WAVES = 4
@@ -59,8 +60,8 @@ class CalibrationMap:
         number = low + (high - low) * unit[:, 0]
         heading = 2.0 * np.pi * unit[:, 1]
         waves.phase[worlds] = 2.0 * np.pi * unit[:, 2]
-        waves.x[worlds] = number * np.cos(heading)
-        waves.y[worlds] = number * np.sin(heading)
+        waves.x[worlds] = number * cos(heading)
+        waves.y[worlds] = number * sin(heading)
         waves.height[worlds] = sd * np.sqrt(2.0 / WAVES)
 
     def shifted(self, position: Array, worlds: Array) -> Array:
@@ -84,6 +85,6 @@ def shift(waves: Waves, w: int, x: float, y: float) -> tuple[float, float]:
     dx = dy = 0.0
     for k in range(WAVES):
         phase = waves.phase[w, k]
-        dx += np.cos(waves.x[w, k, 0] * x + waves.y[w, k, 0] * y + phase[0])
-        dy += np.cos(waves.x[w, k, 1] * x + waves.y[w, k, 1] * y + phase[1])
+        dx += cos(waves.x[w, k, 0] * x + waves.y[w, k, 0] * y + phase[0])
+        dy += cos(waves.x[w, k, 1] * x + waves.y[w, k, 1] * y + phase[1])
     return x + waves.height[w] * dx, y + waves.height[w] * dy

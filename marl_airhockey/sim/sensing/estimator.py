@@ -17,6 +17,7 @@ from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.table import GRAVITY
 from marl_airhockey.sim.jit.cache import compiled, inner
+from marl_airhockey.sim.jit.elementary import sin
 from marl_airhockey.types import Array
 
 STEP = 0.01
@@ -83,7 +84,7 @@ class Estimator:
         noise = middle["position_noise"] ** 2 + (middle["calibration_error"] / 4) ** 2
         self._known = Surroundings(
             np.array(
-                [*(-GRAVITY * np.sin(tilts)), *(middle[name] for name in PARAMETERS)]
+                [*(-GRAVITY * sin(tilts)), *(middle[name] for name in PARAMETERS)]
             ),
             table.normals,
             table.offsets,

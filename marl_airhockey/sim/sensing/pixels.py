@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from marl_airhockey.sim.core.geometry import products
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.types import Array
 
@@ -33,12 +34,12 @@ def small_picture(
     import cv2
 
     image = np.zeros((size, size), np.uint8)
-    corners = np.asarray(scene.table.vertices) @ rotation.T
+    corners = products(np.asarray(scene.table.vertices), rotation)
     extent = float(np.abs(corners).max())
     scale = (size / 2 - 1) / extent
 
     def pixel(point: Array) -> tuple[int, int]:
-        x, y = rotation @ point * scale
+        x, y = products(point, rotation) * scale
         return round((size / 2 + x) * 2**SHIFT), round((size / 2 - y) * 2**SHIFT)
 
     outline = np.array([pixel(np.asarray(c)) for c in scene.table.vertices], np.int32)

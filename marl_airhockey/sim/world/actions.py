@@ -9,6 +9,7 @@ import numpy as np
 
 from marl_airhockey.sim.contracts.backend import Command
 from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.geometry import products
 from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.sensing.delay import Delay
@@ -135,8 +136,8 @@ class Actions:
         if not acts:
             given = np.isfinite(measured[:, :1])
             action[:, k] = np.where(given, 0.0, action[:, k])
-        prescribed[:, k, :2] = measured[:, :2] @ self._rotations[k]
-        prescribed[:, k, 2:] = measured[:, 2:] @ self._rotations[k]
+        prescribed[:, k, :2] = products(measured[:, :2], self._rotations[k].T)
+        prescribed[:, k, 2:] = products(measured[:, 2:], self._rotations[k].T)
 
 
 class _Elimination:

@@ -90,23 +90,25 @@ class ControlStep:
         memory: Memory,
         lags: bool = False,
     ) -> None:
-        self._inputs, self._backend, self._referee = inputs, backend, referee
+        self.inputs, self._backend, self._referee = inputs, backend, referee
         self._observer, self._reach, self._limit = observer, reach, limit
         self._name, self._lags = referee.scenario.name, lags
         self._response = np.zeros_like(inputs.action)
         """Responses of the servos to the commands, as actions (B, seats, 2)."""
-        self._moments = tuple(self._moment(state, memory, episode) for _ in range(2))
-        self._now = 0
-        self._pipelines: list[Pipeline] = []
+        self.moments = tuple(self._moment(state, memory, episode) for _ in range(2))
+        self.current = 0
+        """Index of the current moment."""
+        self.pipelines: list[Pipeline] = []
+        """Pipelines from the first moment to the second, and back."""
         self._compile()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_pipelines": []}
+        return {**vars(self), "pipelines": []}
 
     @property
     def now(self) -> Moment:
         """Current moment of the worlds."""
-        return self._moments[self._now]
+        return self.moments[self.current]
 
     def __call__(self) -> Moment:
         """Move all worlds by a step and return the moment after it.
@@ -114,12 +116,12 @@ class ControlStep:
         Raises:
             ValueError: An action is not finite.
         """
-        if not self._pipelines:
+        if not self.pipelines:
             self._compile()
-        if not self._pipelines[self._now]():
+        if not self.pipelines[self.current]():
             raise ValueError(INFINITE)
-        self._now = 1 - self._now
-        return self._moments[self._now]
+        self.current = 1 - self.current
+        return self.moments[self.current]
 
     def _moment(self, state: State, memory: Memory, episode: EpisodeCounters) -> Moment:
         """Return a moment with new arrays, filled as by a step of zero length."""
@@ -138,14 +140,14 @@ class ControlStep:
         return Moment(here, commanded, realized, rate, verdict, counted, shown)
 
     def _compile(self) -> None:
-        first, second = self._moments
+        first, second = self.moments
         pairs = (first, second), (second, first)
-        self._pipelines = [self._pipeline(*pair) for pair in pairs]
+        self.pipelines = [self._pipeline(*pair) for pair in pairs]
 
     def _limits(self, before: Moment, after: Moment) -> list[Stage]:
         """Return the stages from actions to the commands that paddles follow."""
         state, physics = before.state, before.episode.physics
-        action, prescribed = self._inputs.action, self._inputs.prescribed
+        action, prescribed = self.inputs.action, self.inputs.prescribed
         top, reach = physics["paddle_speed"], self._reach
         shared = reach, (top, physics["paddle_acceleration"]), self._backend.control_dt
         # On a real table the velocity is delayed, so the last command replaces it.
@@ -176,7 +178,7 @@ class ControlStep:
 
     def _pipeline(self, before: Moment, after: Moment) -> Pipeline:
         state, velocity = before.state, after.realized.velocity
-        command = Command(velocity, *self._inputs[1:])
+        command = Command(velocity, *self.inputs[1:])
         step = Step(
             *(state, velocity, after.state, before.verdict.memory),
             *(before.episode, self._limit),

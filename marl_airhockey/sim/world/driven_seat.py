@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from marl_airhockey.sim.contracts.driver import Driver, View
+from marl_airhockey.sim.core.geometry import products
 from marl_airhockey.sim.core.rng import StreamSet
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.world.known import Known
@@ -139,8 +140,8 @@ class DrivenSeat:
             position[:, self.index] = sensed.position[worlds, self.index]
             velocity[:, self.index] = sensed.velocity[worlds, self.index]
         if self._rotation[0, 0] != 1.0:
-            position = position @ self._rotation.T
-            velocity = velocity @ self._rotation.T
+            position = products(position, self._rotation)
+            velocity = products(velocity, self._rotation)
         return View(
             scene=self._observer.scenario.scene,
             state=replace(state, position=position, velocity=velocity),
@@ -165,7 +166,7 @@ class DrivenSeat:
         """
         rows = []
         for name in ("position", "velocity"):
-            row = getattr(seen, name) @ self._rotation
+            row = products(getattr(seen, name), self._rotation.T)
             row[:, self.index] = getattr(state, name)[:, self.index]
             rows.append(row)
         return replace(seen, position=rows[0], velocity=rows[1])

@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from marl_airhockey.sim.core.geometry import length, products
 from marl_airhockey.sim.core.limits import away
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.seat import ReachPlanes, reaches
@@ -49,7 +50,7 @@ def check_placement(state: State, scene: Scene, parked: Array, longest: float) -
     gone = np.zeros((len(parked), len(names)), np.bool_)
     gone[:, state.bodies.paddle] = parked
     for i in range(state.bodies.movers):
-        speed = np.linalg.norm(state.velocity[:, i], axis=-1)
+        speed = length(state.velocity[:, i])
         _refuse(f"{names[i]} moves at {{}} m/s", speed, FASTEST, 1.0)
         rim = np.abs(state.spin[:, i]) * state.bodies.radius[i]
         _refuse(f"{names[i]} spins at {{}} m/s at its rim", rim, FASTEST, 1.0)
@@ -67,7 +68,7 @@ def check_placement(state: State, scene: Scene, parked: Array, longest: float) -
     for i, k in combinations(range(state.bodies.movers), 2):
         if i < paddles <= k < paddles + pucks:
             continue
-        between = np.linalg.norm(state.position[:, i] - state.position[:, k], axis=-1)
+        between = length(state.position[:, i] - state.position[:, k])
         overlap = state.bodies.radius[i] + state.bodies.radius[k] - between
         overlap[gone[:, i] | gone[:, k]] = 0.0
         _refuse(f"{names[i]} and {names[k]} overlap by {{}} mm", overlap, DEEPEST)
@@ -89,7 +90,7 @@ def _depth(state: State, scene: Scene, body: int) -> Array:
     """
     table, position = scene.table, state.position[:, body]
     radius = state.bodies.radius[body]
-    depth = radius - (position @ table.normals.T + table.offsets)
+    depth = radius - (products(position, table.normals) + table.offsets)
     if state.bodies.kind[body] is Kind.PUCK:
         depth[_before_goal(position, scene)] -= radius
     paddle = state.bodies.kind[body] is Kind.PADDLE
@@ -106,20 +107,20 @@ def _before_goal(position: Array, scene: Scene) -> Array:
     before = np.zeros((*position.shape[:-1], sides), np.bool_)
     for line in scene.goal_lines:
         start, end = scene.opening(line)
-        reach = np.linalg.norm(end - start) / 2
-        along = (position - (start + end) / 2) @ (end - start) / (2 * reach)
+        reach = length(end - start) / 2
+        along = ((position - (start + end) / 2) * (end - start)).sum(-1) / (2 * reach)
         before[..., line.side] |= np.abs(along) < reach
     return before
 
 
 def _on_goal_line(state: State, scene: Scene) -> Array:
     """Return True for pucks with the centre on or beyond a goal line (W, pucks)."""
-    depth = -(state.puck @ scene.table.normals.T + scene.table.offsets)
+    depth = -(products(state.puck, scene.table.normals) + scene.table.offsets)
     return np.asarray((_before_goal(state.puck, scene) & (depth > -1e-6)).any(-1))
 
 
 def _beyond_reach(state: State, scene: Scene) -> Array:
     """Return the distance of each paddle beyond its workspace (W, seats), m."""
     normals, offsets = reaches(scene.table, scene.seats)
-    inside = np.einsum("skd,wsd->wsk", normals, state.paddle) + offsets
+    inside = (normals * state.paddle[..., None, :]).sum(-1) + offsets
     return np.asarray(-inside.min(-1))

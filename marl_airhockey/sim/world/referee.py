@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from marl_airhockey.sim.contracts.scenario import Scenario, Transition
+from marl_airhockey.sim.core.geometry import products
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.jit.fused import Fused, Sink, Source
 from marl_airhockey.sim.jit.pipeline import Stage
@@ -117,7 +118,7 @@ class Referee:
         # Contacts can stop a paddle that tracks commands, so use its actual velocity.
         rotated = after.paddle_velocity if self._tracks_commands else command
         if not self._straight:
-            rotated = (self._rotations @ rotated[..., None])[..., 0]
+            rotated = products(rotated, self._rotations)
         share = rotated / physics["paddle_speed"][..., None, None]
         outcome = {
             "reward": reward,

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.core.geometry import length
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import Bodies, State
 from marl_airhockey.types import Array, Memory
@@ -92,7 +93,7 @@ def settled(state: State, scene: Scene, count: int) -> State:
     made = replace(rest, **fields)
     gap = made.paddle[..., :, None, :] - made.puck[..., None, :, :]
     touch = scene.table.paddle_radius + scene.table.puck_radius
-    near = np.hypot(gap[..., 0], gap[..., 1]) < touch
+    near = length(gap) < touch
     return replace(made, touching=near)
 
 

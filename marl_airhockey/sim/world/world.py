@@ -129,7 +129,7 @@ class World(WorldSpaces):
     @property
     def serves(self) -> bool:
         """True if the rules of the game serve pucks."""
-        return "serves" in self._built.now.verdict.outcome
+        return "serves" in self.control_step.now.verdict.outcome
 
     @property
     def sensed(self) -> State:
@@ -164,12 +164,12 @@ class World(WorldSpaces):
     @property
     def command(self) -> Array:
         """Command of the last step (B, seats, 2), table frame, m/s; a copy."""
-        return self._built.now.realized.velocity.copy()
+        return self.control_step.now.realized.velocity.copy()
 
     @property
     def terms(self) -> dict[str, Array]:
         """Reward terms of the last step by name (B, seats); copies."""
-        terms = self._built.now.verdict.terms
+        terms = self.control_step.now.verdict.terms
         return {name: term.copy() for name, term in terms.items()}
 
     @property
@@ -212,13 +212,14 @@ class World(WorldSpaces):
         The keys are ``reward`` (B, seats), ``applied_action`` (B, seats, 2),
         ``violation`` (B, seats, 5), ``terminated`` (B,) and ``truncated`` (B,).
         """
-        now = self._built.now
+        now = self.control_step.now
         names = "reward", "applied_action", "terminated", "truncated"
         parts = {name: now.verdict.outcome[name].copy() for name in names}
         return parts | {"violation": now.commanded.violation.copy()}
 
     @property
-    def _built(self) -> ControlStep:
+    def control_step(self) -> ControlStep:
+        """Control step, whose arrays every step overwrites; it is read only."""
         if self._step is None:
             self._refuse_closed("step")
             raise RuntimeError("step: call reset() first; no episode is running")
@@ -391,7 +392,7 @@ class World(WorldSpaces):
 
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Write rows of a state and a memory into some worlds, by index (W,)."""
-        self._built.now.write(worlds, rows, memory)
+        self.control_step.now.write(worlds, rows, memory)
         self.backend.reset(self._state, worlds)
 
     @property
@@ -439,7 +440,7 @@ class World(WorldSpaces):
             RuntimeError: There was no `reset` before.
             ValueError: A shape is wrong, or an element is not finite.
         """
-        step = self._built
+        step = self.control_step
         self._requested = self._actions.collect(actions, prescribed, self._known)
         self.sensor.note(self._requested)
         if self._drag is not None:
@@ -457,7 +458,9 @@ class World(WorldSpaces):
 
     def empty_result(self) -> StepResult:
         """Return a result that is all 0, without an observation."""
-        result = StepResult.of(self._built.now, self.open if self.driven else None)
+        result = StepResult.of(
+            self.control_step.now, self.open if self.driven else None
+        )
         result.clear()
         return result
 

@@ -76,12 +76,12 @@ def test_what_lags_keeps_to_its_reach_speed_and_acceleration(name, planar, world
 def test_without_a_servo_the_command_is_the_order():
     world = ah.make_world("juggle", 2)
     world.reset(0)
-    assert world._built.now.commanded is world._built.now.realized
+    assert world.control_step.now.commanded is world.control_step.now.realized
 
 
 def test_an_arm_has_its_own_servo():
     pytest.importorskip("robosuite")
     world = ah.make_world("reach", 1, backend="robosuite", profile="ur5e")
     world.reset(0)
-    assert world._built.now.commanded is world._built.now.realized
+    assert world.control_step.now.commanded is world.control_step.now.realized
     world.close()

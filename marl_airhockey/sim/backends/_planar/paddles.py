@@ -6,6 +6,7 @@ import numpy as np
 
 from marl_airhockey.sim.contracts.backend import MAX_PRESCRIBED_SPEED
 from marl_airhockey.sim.jit.cache import compiled, inner
+from marl_airhockey.sim.jit.elementary import hypot
 from marl_airhockey.types import Array
 
 
@@ -46,7 +47,7 @@ def follow(
             for axis in range(2):
                 distance = prescribed[b, i, axis] - position[b, i, axis]
                 goal[b, i, axis] = distance / dt
-            speed = np.hypot(goal[b, i, 0], goal[b, i, 1])
+            speed = hypot(goal[b, i, 0], goal[b, i, 1])
             raised[b, i] |= speed > MAX_PRESCRIBED_SPEED
 
 

@@ -10,6 +10,7 @@ from marl_airhockey.sim.core.parameters import SCATTER
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.seat import reaches
 from marl_airhockey.sim.core.table import GRAVITY
+from marl_airhockey.sim.jit.elementary import expm1, hypot, sin
 from marl_airhockey.types import Array
 
 PULL_X, PULL_Y, DAMPING, DRAG = range(4)
@@ -40,13 +41,13 @@ def make_coefficients(values: dict[str, Array], control_dt: float) -> Array:
         *("puck_restitution", "puck_friction", "block_restitution"),
         *("puck_mass", "block_mass", "block_friction"),
     )
-    pull_x = -GRAVITY * np.sin(np.radians(values["tilt"]))
-    pull_y = -GRAVITY * np.sin(np.radians(values["cross_tilt"]))
+    pull_x = -GRAVITY * sin(np.radians(values["tilt"]))
+    pull_y = -GRAVITY * sin(np.radians(values["cross_tilt"]))
     damping = values["puck_damping"]
-    time = -np.expm1(-damping * control_dt) / np.maximum(damping, 1e-300)
+    time = -expm1(-damping * control_dt) / np.maximum(damping, 1e-300)
     time = np.where(damping > 0.0, time, control_dt)
     columns = [pull_x, pull_y, *(values[n] for n in names)]
-    columns += [np.hypot(pull_x, pull_y), time]
+    columns += [hypot(pull_x, pull_y), time]
     columns += [values[name] for name in SCATTER]
     return np.stack(columns, axis=-1)
 

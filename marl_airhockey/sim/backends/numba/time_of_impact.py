@@ -51,6 +51,7 @@ from marl_airhockey.sim.backends.numba.geometry import (
 from marl_airhockey.sim.backends.numba.impacts import solve
 from marl_airhockey.sim.core.laws import fly, slide
 from marl_airhockey.sim.jit.cache import inner
+from marl_airhockey.sim.jit.elementary import exp, log
 from marl_airhockey.types import Array
 
 REFINEMENTS = 5
@@ -150,11 +151,11 @@ def move_to_impact(
         # At the cap on speed, a body moves less than half of `TOUCH` in this time.
         if share == furthest or abs(share - 1.0) * h < 4e-8:
             break
-        error = np.log(max(share, 1e-9))
+        error = log(max(share, 1e-9))
         if jam and error > 0.0 > last:
             # Bodies under pressure start from rest, so that their paths grow faster
             # than the time. Use the secant of both errors.
-            share = max(np.exp(error * np.log(h / tried) / (last - error)), 0.1)
+            share = max(exp(error * log(h / tried) / (last - error)), 0.1)
         last, tried = error, h
         h = min(max(h * share, 1e-9), most)
     for i in range(len(m)):

@@ -1,0 +1,126 @@
+"""Exported code: the same bits in another machine's code as in Python."""
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import marl_airhockey as ah
+from marl_airhockey.build import build_world
+from marl_airhockey.code_export import export_code
+from marl_airhockey.sim.jit import targets
+from marl_airhockey.sim.world.layout import layout_of
+
+NODE = shutil.which("node")
+RUNNER = Path(__file__).parent / "helpers" / "run_code.mjs"
+SMALL = """
+import sys
+from marl_airhockey.sim.jit.codegen import load
+from marl_airhockey.sim.jit.elementary import cos
+from marl_airhockey.sim.jit.targets import text_of
+SOURCE = '''
+import math
+import numpy as np
+from numba import carray
+from marl_airhockey.sim.jit.elementary import cos
+from marl_airhockey.sim.jit.pipeline import pointer
+SIGNATURE = "boolean(int64[::1], int64)"
+def kernel(where, n):
+    x = carray(pointer(where[0]), (n,), np.float64)
+    for i in range(n):
+        x[i] = FUNCTION(x[i]) * x[i] + 1.0
+    return True
+'''
+print(text_of(load(SOURCE.replace("FUNCTION", sys.argv[1]), "a test").kernel))
+"""
+
+
+def small(function, cache):
+    """LLVM text of a small pipeline that calls a function."""
+    own = {"MARL_AIRHOCKEY_CACHE": str(cache)}
+    variables = {**os.environ, **targets.UNOPTIMISED, **own}
+    words = [sys.executable, "-c", SMALL, function]
+    return subprocess.run(
+        words, env=variables, check=True, capture_output=True, text=True
+    ).stdout
+
+
+def test_products_are_fused_with_sums_on_no_machine(tmp_path):
+    parts = {"part": small("cos", tmp_path)}
+    for target in targets.TARGETS:
+        machine = targets.machine_of(target)
+        text = machine.emit_assembly(targets.optimised(parts, target, machine))
+        assert re.search(r"\bmulsd\b|\bfmul\b|\bf64\.mul\b", text), target
+        assert not re.search(r"\bv?fn?m(add|sub|la|ls)\w*\b", text), target
+
+
+def test_code_that_calls_the_c_library_is_an_error_that_names_the_function(tmp_path):
+    parts = {"part": small("math.tan", tmp_path)}
+    with pytest.raises(ValueError, match="tan: this code calls functions of the C"):
+        targets.object_code(parts, "wasm32")
+
+
+def test_an_unknown_target_is_an_error_that_names_all(tmp_path):
+    with pytest.raises(ValueError, match="'riscv' is unknown; there are wasm32, aarch"):
+        export_code("duel", "riscv", tmp_path, {})
+
+
+@pytest.mark.parametrize(
+    ("keywords", "worlds", "words"),
+    [({}, 2, "has one world"), ({"backend": "pymunk"}, 1, "is not compiled")],
+)
+def test_a_layout_needs_one_compiled_world(keywords, worlds, words):
+    world = ah.make_world("juggle", worlds, **keywords)
+    world.reset(seed=0)
+    with pytest.raises(ValueError, match=words):
+        layout_of(world)
+
+
+def run(path, actions, tmp_path):
+    """Hash and microseconds per step of exported code in Node."""
+    (tmp_path / "actions").write_bytes(actions.tobytes())
+    words = [NODE, RUNNER, path, tmp_path / "actions", str(len(actions))]
+    done = subprocess.run(words, check=True, capture_output=True, text=True)
+    return json.loads(done.stdout)["hash"]
+
+
+def played(world, actions):
+    """Hash of steps in Python up to a serve, and the actions after their latency."""
+    digest, given = hashlib.sha256(), []
+    for action in actions:
+        world.step(action)
+        now = world.control_step.now
+        if now.verdict.outcome.get("serves", np.zeros(1)).any():
+            break
+        given.append(world.action)
+        state = now.state
+        for array in (state.position, state.velocity, state.angle, state.spin):
+            digest.update(array.tobytes())
+        digest.update(now.verdict.outcome["reward"].tobytes())
+    return digest.hexdigest(), np.array(given)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(NODE is None, reason="there is no Node")
+@pytest.mark.parametrize(
+    ("name", "profile"), [("duel", "ideal"), ("hit_goal_velocity", "ur5e")]
+)
+def test_webassembly_computes_the_bits_of_python(name, profile, tmp_path):
+    pytest.importorskip("ziglang")
+    path = export_code(name, "wasm32", tmp_path, {"profile": profile})
+    world = build_world(name, 1, False, {"profile": profile})
+    world.reset(seed=0)
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1.0, 1.0, (3000, 1, len(world.open), 2))
+    wanted, given = played(world, actions)
+    assert len(given) > 20
+    assert run(path, given, tmp_path) == wanted
+    given[10, 0, 0, 0] += 1e-9
+    assert run(path, given, tmp_path) != wanted
