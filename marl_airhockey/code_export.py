@@ -7,10 +7,14 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from marl_airhockey.build import build_world
+from marl_airhockey.sim.backends.numba.backend import NumbaBackend
 from marl_airhockey.sim.jit.targets import (
     TARGETS,
     UNOPTIMISED,
@@ -20,7 +24,10 @@ from marl_airhockey.sim.jit.targets import (
     text_of,
 )
 from marl_airhockey.sim.world.keywords import Keywords
-from marl_airhockey.sim.world.layout import layout_of
+from marl_airhockey.sim.world.layout import Extra, layout_of
+from marl_airhockey.sim.world.world import World
+from marl_airhockey.toolkit.serves import serve_stage
+from marl_airhockey.toolkit.starts import SPIN
 
 SEED = 0
 """Seed of the episode in the image."""
@@ -56,7 +63,8 @@ def export_code(scenario: str, target: str, out: Path, keywords: Keywords) -> Pa
     (out / name).write_bytes(code)
     (out / f"{scenario}.bin").write_bytes(image)
     path = out / f"{scenario}.json"
-    path.write_text(json.dumps({"scenario": scenario, "code": name, **facts}) + "\n")
+    files = {"scenario": scenario, "code": name, "image": f"{scenario}.bin"}
+    path.write_text(json.dumps({**files, **facts}) + "\n")
     return path
 
 
@@ -78,23 +86,43 @@ def _write(scenario: str, keywords: Keywords, folder: str) -> None:
     """Write the files that `_translated` reads."""
     world = build_world(scenario, 1, False, keywords)
     world.reset(seed=SEED)
-    layout = layout_of(world)
+    layout = layout_of(world, list(_extras(world)))
     names = [f"part_{k}" for k in range(len(layout.parts))]
     for name, part in zip(names, layout.parts, strict=True):
         Path(folder, f"{name}.ll").write_text(text_of(part.kernel))
     facts = {
         "functions": names,
-        "steps": [
-            [
+        "calls": {
+            name: [
                 {"function": names[c.part], "table": c.table, "length": c.length}
                 for c in calls
             ]
-            for calls in layout.steps
-        ],
+            for name, calls in layout.calls.items()
+        },
         "offsets": layout.offsets,
         "arrays": layout.arrays,
         "observation": list(world.observation_labels),
+        "reaction": round(world.observer.reaction / world.control_dt),
         "control_dt": world.control_dt,
+        "spin": SPIN,
     }
     Path(folder, "image").write_bytes(layout.image)
     Path(folder, "facts.json").write_text(json.dumps(facts))
+
+
+def _extras(world: World) -> Iterator[Extra]:
+    """Yield the observation and, in games, the functions of a serve."""
+    step, observer = world.control_step, world.observer
+    if world.sensor.ideal:
+        state = step.now.state, step.now.verdict.memory
+        yield Extra("observe", *observer.detached(*state, observer.observe))
+    if not world.serves or not isinstance(world.backend, NumbaBackend):
+        return
+    units = {"unit": np.zeros((1, 2))}
+    yield Extra("draw", world.serve_stream.stage(units["unit"]), units)
+    # The current moment is moment 0.
+    for n, moment in enumerate((step.now, step.moments[1 - step.current])):
+        for puck in range(world.scene.pucks):
+            serve = serve_stage(world.scene, moment.state, puck)
+            yield Extra(f"serve_{n}_{puck}", *serve)
+        yield Extra(f"place_{n}", world.backend.serve_stage(moment.state), {})

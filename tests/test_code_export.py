@@ -84,43 +84,56 @@ def test_a_layout_needs_one_compiled_world(keywords, worlds, words):
 
 
 def run(path, actions, tmp_path):
-    """Hash and microseconds per step of exported code in Node."""
+    """Hash and number of serves of exported code in Node."""
     (tmp_path / "actions").write_bytes(actions.tobytes())
-    words = [NODE, RUNNER, path, tmp_path / "actions", str(len(actions))]
+    words = [NODE, RUNNER, path, tmp_path / "actions"]
     done = subprocess.run(words, check=True, capture_output=True, text=True)
-    return json.loads(done.stdout)["hash"]
+    found = json.loads(done.stdout)
+    return found["hash"], found["served"]
 
 
-def played(world, actions):
-    """Hash of steps in Python up to a serve, and the actions after their latency."""
-    digest, given = hashlib.sha256(), []
-    for action in actions:
-        world.step(action)
+def played(world, steps):
+    """Hash and number of serves in Python, and the actions after their latency."""
+    digest, given, served = hashlib.sha256(), [], 0
+    rng = np.random.default_rng(0)
+    seats = np.arange(len(world.scene.seats))
+    for _ in range(steps):
+        world.step(rng.uniform(-1.0, 1.0, (1, len(world.open), 2)))
         now = world.control_step.now
-        if now.verdict.outcome.get("serves", np.zeros(1)).any():
-            break
+        served += int(now.verdict.outcome.get("serves", np.zeros(1)).any())
         given.append(world.action)
         state = now.state
         for array in (state.position, state.velocity, state.angle, state.spin):
             digest.update(array.tobytes())
         digest.update(now.verdict.outcome["reward"].tobytes())
-    return digest.hexdigest(), np.array(given)
+        if world.sensor.ideal:
+            digest.update(world.observe(seats).tobytes())
+    return (digest.hexdigest(), served), np.array(given)
+
+
+LONG = {"max_cycles": 12_000, "options": {"goals_to_win": 1000}}
+POLICIES = {"paddle_0": "zoo/duel", "paddle_1": "zoo/duel_3"}
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(NODE is None, reason="there is no Node")
 @pytest.mark.parametrize(
-    ("name", "profile"), [("duel", "ideal"), ("hit_goal_velocity", "ur5e")]
+    ("name", "keywords", "drivers", "steps"),
+    [
+        ("duel", LONG, POLICIES, 10_000),
+        ("duel", {**LONG, "options": {"pucks": 2, "goals_to_win": 1000}}, {}, 3000),
+        ("hit_goal_velocity", {"profile": "ur5e"}, {}, 3000),
+    ],
 )
-def test_webassembly_computes_the_bits_of_python(name, profile, tmp_path):
+def test_webassembly_computes_the_bits_of_python(
+    name, keywords, drivers, steps, tmp_path
+):
     pytest.importorskip("ziglang")
-    path = export_code(name, "wasm32", tmp_path, {"profile": profile})
-    world = build_world(name, 1, False, {"profile": profile})
+    path = export_code(name, "wasm32", tmp_path, keywords)
+    world = build_world(name, 1, False, {**keywords, "drivers": drivers})
     world.reset(seed=0)
-    rng = np.random.default_rng(0)
-    actions = rng.uniform(-1.0, 1.0, (3000, 1, len(world.open), 2))
-    wanted, given = played(world, actions)
-    assert len(given) > 20
-    assert run(path, given, tmp_path) == wanted
+    (wanted, served), given = played(world, steps)
+    assert served > 10 or name != "duel"
+    assert run(path, given, tmp_path) == (wanted, served)
     given[10, 0, 0, 0] += 1e-9
-    assert run(path, given, tmp_path) != wanted
+    assert run(path, given, tmp_path)[0] != wanted

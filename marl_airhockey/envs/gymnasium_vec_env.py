@@ -27,7 +27,7 @@ from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.checks import check_count
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.world.keywords import Keywords
-from marl_airhockey.sim.world.observer import Observation
+from marl_airhockey.sim.world.observation import Observation
 from marl_airhockey.sim.world.spaces import action_space, observation_space
 from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.types import Array, Memory

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.sim.core.errors import unknown_name
-from marl_airhockey.sim.world.observer import Observation
+from marl_airhockey.sim.world.observation import Observation
 from marl_airhockey.sim.world.world import World
 
 OPTIONS = ("state", "memory")

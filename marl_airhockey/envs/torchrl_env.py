@@ -14,7 +14,7 @@ from torchrl.envs import EnvBase
 from marl_airhockey.build import build_world
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.world.keywords import Keywords
-from marl_airhockey.sim.world.observer import Observation
+from marl_airhockey.sim.world.observation import Observation
 from marl_airhockey.sim.world.spaces import observation_space
 from marl_airhockey.types import Array
 

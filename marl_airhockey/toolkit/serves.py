@@ -13,6 +13,7 @@ from marl_airhockey.sim.core.seat import ReachPlanes
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.sim.jit.elementary import cos, sin
+from marl_airhockey.sim.jit.pipeline import Fixed, Stage
 from marl_airhockey.toolkit.starts import SPIN
 from marl_airhockey.types import Array
 
@@ -119,6 +120,25 @@ def serve(
         *(bodies.puck.start, puck, np.array(bodies.radius), _positions(scene)[puck]),
         *(np.flatnonzero(some), heading + 0.3 * draws[:, 0], SPIN * draws[:, 1]),
     )
+
+
+def serve_stage(
+    scene: Scene, state: State, puck: int
+) -> tuple[Stage, dict[str, Array]]:
+    """Return a stage that serves a puck in all worlds of a state, by reference.
+
+    Returns:
+        Stage, and its inputs (W,): ``heading``, rad, and ``edge``, speed of the puck's
+        edge divided by its speed.
+    """
+    worlds, bodies = len(state.time), state.bodies
+    given = {"heading": np.zeros(worlds), "edge": np.zeros(worlds)}
+    arguments = (
+        *(state.position, state.velocity, state.spin, state.touching),
+        *(bodies.puck.start, puck, Fixed(np.array(bodies.radius))),
+        *(Fixed(_positions(scene)[puck]), Fixed(np.arange(worlds)), *given.values()),
+    )
+    return Stage(_serve, arguments), given
 
 
 def serve_all(

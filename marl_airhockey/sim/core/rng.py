@@ -17,6 +17,7 @@ import numpy as np
 
 from marl_airhockey.sim.jit.cache import compiled, inner
 from marl_airhockey.sim.jit.elementary import cos, log1p, sin
+from marl_airhockey.sim.jit.pipeline import Fixed, Stage
 from marl_airhockey.types import Array
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -133,6 +134,11 @@ class RandomStreams:
         unit = np.empty((len(self._rows), math.prod(shape)))
         _unit(self._keys, self._counts, self._rows, unit)
         return unit.reshape(len(unit), *shape)
+
+    def stage(self, unit: Array) -> Stage:
+        """Return a stage that fills an array (W, n) with numbers uniform in [0, 1)."""
+        arrays = self._keys, self._counts, Fixed(self._rows), unit
+        return Stage(_unit, arrays)
 
     def uniform(self, low: Array | float, high: Array | float, *shape: int) -> Array:
         """Sample (W, *shape) numbers uniform in [low, high), narrowed by `spread`."""

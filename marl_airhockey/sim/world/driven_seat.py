@@ -12,7 +12,8 @@ from marl_airhockey.sim.core.geometry import products
 from marl_airhockey.sim.core.rng import StreamSet
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.world.known import Known
-from marl_airhockey.sim.world.observer import Observation, Observer
+from marl_airhockey.sim.world.observation import Observation
+from marl_airhockey.sim.world.observer import Observer
 from marl_airhockey.types import ALL, Array, Rows
 
 

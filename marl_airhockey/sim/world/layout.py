@@ -8,13 +8,13 @@ that are offsets.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from marl_airhockey.sim.jit.pipeline import CompiledPart
+from marl_airhockey.sim.jit.pipeline import CompiledPart, Pipeline, Stage
 from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
 
@@ -22,8 +22,17 @@ ALIGNMENT = 16
 """Alignment of arrays in the image, bytes."""
 
 
+class Extra(NamedTuple):
+    """Function in addition to the control step, such as a serve."""
+
+    name: str
+    stage: Stage
+    arrays: Mapping[str, Array]
+    """Arrays of its own by name."""
+
+
 class Call(NamedTuple):
-    """Call of a function in a control step."""
+    """Call of a function."""
 
     part: int
     """Index of the function in `Layout.parts`."""
@@ -43,56 +52,67 @@ class Layout(NamedTuple):
     arrays: dict[str, dict[str, Any]]
     """``offset``, ``shape`` and ``dtype`` of each named array. Moment 0 is the current
     one of a new episode."""
-    steps: list[list[Call]]
-    """Calls of the step from moment 0 to moment 1, and of the step back."""
+    calls: dict[str, list[Call]]
+    """Calls by name: "step_0" from moment 0 to moment 1, "step_1" back, and extras."""
     parts: list[CompiledPart]
     """Functions."""
 
 
-def layout_of(world: World) -> Layout:
+def layout_of(world: World, extras: Sequence[Extra] = ()) -> Layout:
     """Return the layout of a world, of which an episode has begun.
 
+    Args:
+        world: One world.
+        extras: Functions in addition to the control step.
+
     Raises:
-        ValueError: There are several worlds, or a function of the control step is not
-            compiled.
+        ValueError: There are several worlds, or a function is not compiled.
     """
-    step = world.control_step
     if world.num_worlds != 1:
         raise ValueError(f"num_worlds: {world.num_worlds}; a layout has one world")
-    steps, parts = [], dict[int, CompiledPart]()
-    for pipeline in step.pipelines:
-        for part in pipeline.parts:
-            if not isinstance(part, CompiledPart):
-                raise ValueError(
-                    f"{world.scenario.name}: a function of the control step is not "
-                    f"compiled: {world.referee.refused or part.function}"
-                )
-            parts.setdefault(id(part.kernel), part)
-    first = step.moments[step.current], step.moments[1 - step.current]
-    names = {
-        array.ctypes.data: name
-        for root, value in (
-            ("backend", vars(world.backend)),
-            *(("inputs", step.inputs), ("moment_0", first[0]), ("moment_1", first[1])),
-        )
-        for name, array in _arrays(root, value)
+    step = world.control_step
+    order = step.current, 1 - step.current
+    parts = {f"step_{n}": step.pipelines[k].parts for n, k in enumerate(order)}
+    for extra in extras:
+        parts[extra.name] = Pipeline(1, [extra.stage], world.scenario.name).parts
+    blocks = _Blocks([x for part in _compiled(world, parts) for x in _of(part)])
+    functions: dict[int, CompiledPart] = {}
+    for part in _compiled(world, parts):
+        functions.setdefault(id(part.kernel), part)
+    indices = {kernel: k for k, kernel in enumerate(functions)}
+    calls = {
+        name: [
+            Call(indices[id(part.kernel)], *blocks.add_table(part))
+            for part in row
+            if isinstance(part, CompiledPart)
+        ]
+        for name, row in parts.items()
     }
-    blocks = _Blocks([a for p in step.pipelines for q in p.parts for a in _of(q)])
-    order = list(parts)
-    # The current moment is moment 0, so its pipeline is the first one.
-    for k in (step.current, 1 - step.current):
-        steps.append(
-            [
-                Call(order.index(id(part.kernel)), *blocks.add_table(part))
-                for part in step.pipelines[k].parts
-                if isinstance(part, CompiledPart)
-            ]
-        )
+    roots = [("backend", vars(world.backend)), ("inputs", step.inputs)]
+    roots += [(f"moment_{n}", step.moments[k]) for n, k in enumerate(order)]
+    roots += [(extra.name, extra.arrays) for extra in extras]
+    # Of several names of an array, the last one is used.
+    names = {a.ctypes.data: name for root in roots for name, a in _arrays(*root)}
     arrays = {
         names.get(address, f"constant_{k}"): blocks.entry(array)
         for k, (address, array) in enumerate(sorted(blocks.arrays.items()))
     }
-    return Layout(bytes(blocks.image), blocks.offsets, arrays, steps, [*parts.values()])
+    used = list(functions.values())
+    return Layout(bytes(blocks.image), blocks.offsets, arrays, calls, used)
+
+
+def _compiled(
+    world: World, parts: Mapping[str, Sequence[Stage | CompiledPart]]
+) -> Iterator[CompiledPart]:
+    """Yield all parts, which must be compiled."""
+    for row in parts.values():
+        for part in row:
+            if not isinstance(part, CompiledPart):
+                raise ValueError(
+                    f"{world.scenario.name}: a function is not compiled: "
+                    f"{world.referee.refused or part.function}"
+                )
+            yield part
 
 
 def _of(part: Any) -> Iterator[Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -24,10 +24,9 @@ from marl_airhockey.sim.jit.fused import Fused, Sink, Source
 from marl_airhockey.sim.jit.pipeline import Stage
 from marl_airhockey.sim.sensing.reaction import Parts, ReactionDelay, whole_steps
 from marl_airhockey.sim.sensing.sensor import Sensor
+from marl_airhockey.sim.world.observation import Observation, replaced
 from marl_airhockey.types import ALL, Array, Memory, Rows
 
-Observation = Array | Mapping[str, Array]
-"""Array (B, seats, D) float32 or (B, seats, 84, 84, 3) uint8, or dict with goals."""
 PIXELS = 84
 GOALS = ("achieved_goal", "desired_goal")
 
@@ -166,6 +165,30 @@ class Observer:
         sources = vars(state), memory, self.sensor.past()
         return [self._fused[self.observe].stage(sources, (shown,))]
 
+    def detached(
+        self, sensed: State, memory: Memory, form: str
+    ) -> tuple[Stage, dict[str, Array]]:
+        """Return a stage that observes from arrays of its own, and these arrays.
+
+        Args:
+            sensed: Current sensed state, table frame.
+            memory: Current memory.
+            form: Observation type.
+
+        Returns:
+            Stage of all seats, and its arrays by name: ``state``, ``memory`` and
+            ``sensor`` with the names of their elements, and ``observation``.
+        """
+        fused, sources = self._fused[form], self._sources(sensed, memory, form)
+        copies = tuple(
+            {k: v.copy() if isinstance(v, np.ndarray) else v for k, v in s.items()}
+            for s in sources
+        )
+        (shown,) = fused.prepare(*copies)
+        named = dict(zip(("state", "memory", "sensor"), copies, strict=True))
+        arrays = {f"{of}.{k}": v for of, part in named.items() for k, v in part.items()}
+        return fused.stage(copies, (shown,)), {**arrays, "observation": shown["flat"]}
+
     def read(
         self,
         sensed: State,
@@ -193,7 +216,7 @@ class Observer:
             return self._pictures(memory, seats, worlds)
         fused, sources = self._fused[form], self._sources(sensed, memory, form)
         if seen is not None:
-            sources[0].update(_replaced(sources[0], seen, worlds))
+            sources[0].update(replaced(sources[0], seen, worlds))
         every = isinstance(worlds, slice)
         found = fused(*sources) if every else fused.at(np.asarray(worlds), *sources)
         return self.of_seats(found[0], seats)
@@ -271,28 +294,3 @@ class Observer:
         if goals is not None:
             goals = goals[worlds]
         return pictures_of(self.scenario.scene, frames[worlds], goals, seats, PIXELS)
-
-
-def _replaced(source: Source, seen: State, worlds: Rows) -> dict[str, Array]:
-    """Return positions and velocities of all worlds, replaced in some of them."""
-    replaced = {}
-    for name in ("position", "velocity"):
-        replaced[name] = source[name].copy()
-        replaced[name][worlds] = getattr(seen, name)
-    return replaced
-
-
-def duplicate(observation: Observation) -> Observation:
-    """Return a copy of an observation with new arrays."""
-    if isinstance(observation, np.ndarray):
-        return observation.copy()
-    return {name: array.copy() for name, array in observation.items()}
-
-
-def put(observation: Observation, worlds: Array, rows: Observation) -> None:
-    """Replace the observations of some worlds, by index (W,), in place."""
-    if isinstance(observation, np.ndarray):
-        observation[worlds] = rows
-    elif isinstance(rows, Mapping):
-        for name, array in observation.items():
-            array[worlds] = rows[name]

@@ -9,7 +9,7 @@ import numpy as np
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.world.control_step import Moment
-from marl_airhockey.sim.world.observer import Observation
+from marl_airhockey.sim.world.observation import Observation
 from marl_airhockey.types import Array, Memory
 
 

@@ -37,7 +37,8 @@ from marl_airhockey.sim.world.driven_seat import DrivenSeat
 from marl_airhockey.sim.world.elements import DragRegions, check_elements, clear_start
 from marl_airhockey.sim.world.episode import EpisodeCounters, PhysicsRows
 from marl_airhockey.sim.world.known import Known
-from marl_airhockey.sim.world.observer import Observation, Observer, duplicate, put
+from marl_airhockey.sim.world.observation import Observation, duplicate, put
+from marl_airhockey.sim.world.observer import Observer
 from marl_airhockey.sim.world.placement import check_placement
 from marl_airhockey.sim.world.referee import Referee
 from marl_airhockey.sim.world.sensed_memory import SensedMemory
@@ -311,6 +312,11 @@ class World(WorldSpaces):
             memory = self.scenario.initial_memory(rows, rng)
         self._begin(worlds, rows, self._aimed(rng, rows, memory, worlds))
         return rng
+
+    @property
+    def serve_stream(self) -> RandomStreams:
+        """Random streams of serves, which continue with every serve."""
+        return self._streams.of("serve")
 
     def set_state(
         self, state: State, memory: Memory | None = None, worlds: Array | None = None

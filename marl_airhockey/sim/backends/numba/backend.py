@@ -85,6 +85,14 @@ class NumbaBackend(Backend):
             *(self._against, self._out, self._pinned),
         )
 
+    def serve_stage(self, state: State) -> Stage:
+        """Return a stage that puts the pucks of a state into play, by reference."""
+        static, radius = self._static, self.scene.table.puck_radius
+        walls = Fixed(static.walls), Fixed(static.wall_side)
+        arguments = Fixed(np.arange(self.num_worlds)), state.puck, radius, *walls
+        filled = self._against, self._out, self._pinned
+        return Stage(begin_pucks, (*arguments, *filled))
+
     def stage(self, command: Command, before: State, after: State) -> Stage:
         static = [Fixed(x) if isinstance(x, np.ndarray) else x for x in self._static]
         given = ("position", "velocity", "angle", "spin", "touching", "time")
