@@ -18,7 +18,7 @@ from marl_airhockey.code_export import export_code
 from marl_airhockey.sim.jit import targets
 from marl_airhockey.sim.world.layout import layout_of
 
-NODE = shutil.which("node")
+NODE, QEMU = shutil.which("node"), shutil.which("qemu-aarch64")
 RUNNER = Path(__file__).parent / "helpers" / "run_code.mjs"
 SMALL = """
 import sys
@@ -137,3 +137,53 @@ def test_webassembly_computes_the_bits_of_python(
     assert run(path, given, tmp_path) == (wanted, served)
     given[10, 0, 0, 0] += 1e-9
     assert run(path, given, tmp_path)[0] != wanted
+
+
+def header(facts):
+    """C text with the facts of a description, for run_code.c."""
+
+    def array(name):
+        found = facts["arrays"][name]
+        bytes_ = int(np.prod(found["shape"])) * np.dtype(found["dtype"]).itemsize
+        return f"{{{found['offset']}, {bytes_}}}"
+
+    def calls(name):
+        rows = (f"{{{c['function']}, {c['table']}, {c['length']}}}" for c in name)
+        return "{" + ", ".join(rows) + "}"
+
+    shown = [f"state.{n}" for n in ("position", "velocity", "angle", "spin")]
+    shown.append("verdict.outcome.reward")
+    steps = facts["calls"]["step_0"], facts["calls"]["step_1"]
+    offsets = ", ".join(map(str, facts["offsets"]))
+    lines = [f"function {name};" for name in facts["functions"]]
+    lines += [
+        f"static const int64_t OFFSETS[] = {{{offsets}}};",
+        f"static const array ACTION = {array('inputs.action')};",
+        f"enum {{ CALLS = {len(steps[0])}, SHOWN = {len(shown)} }};",
+    ]
+    for k, step in enumerate(steps):
+        arrays = ", ".join(array(f"moment_{k}.{name}") for name in shown)
+        lines.append(f"static const call STEP_{k}[] = {calls(step)};")
+        lines.append(f"static const array SHOWN_{k}[] = {{{arrays}}};")
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(QEMU is None, reason="there is no emulator of aarch64")
+def test_aarch64_computes_the_bits_of_python(tmp_path):
+    pytest.importorskip("ziglang")
+    keywords = {"profile": "ur5e"}
+    path = export_code("hit_goal_velocity", "aarch64", tmp_path, keywords)
+    facts = json.loads(path.read_text())
+    (tmp_path / "facts.h").write_text(header(facts))
+    program, code = tmp_path / "run", tmp_path / facts["code"]
+    words = ["-m", "ziglang", "cc", "-target", "aarch64-linux-musl", "-static"]
+    sources = [RUNNER.with_suffix(".c"), code, "-I", tmp_path, "-o", program]
+    subprocess.run([sys.executable, *words, *sources], check=True)
+    world = build_world("hit_goal_velocity", 1, False, keywords)
+    world.reset(seed=0)
+    (wanted, _), given = played(world, 3000)
+    (tmp_path / "actions").write_bytes(given.tobytes())
+    words = [QEMU, program, tmp_path / facts["image"], tmp_path / "actions"]
+    done = subprocess.run(words, check=True, capture_output=True)
+    assert hashlib.sha256(done.stdout).hexdigest() == wanted
