@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from pathlib import Path
 from typing import Annotated
@@ -32,4 +33,6 @@ def export_code(
     """
     path = write_code(scenario, target, out, Keywords(profile=profile))
     code = out / json.loads(path.read_text())["code"]
-    print(f"{code}: {code.stat().st_size / 1000:.0f} kB; {path} lists its arrays")
+    data = code.read_bytes()
+    size, packed = len(data) / 1000, len(gzip.compress(data)) / 1000
+    print(f"{code}: {size:.0f} kB, {packed:.0f} kB compressed; {path} lists its arrays")

@@ -72,20 +72,18 @@ def layout_of(world: World, extras: Sequence[Extra] = ()) -> Layout:
         raise ValueError(f"num_worlds: {world.num_worlds}; a layout has one world")
     step = world.control_step
     order = step.current, 1 - step.current
-    parts = {f"step_{n}": step.pipelines[k].parts for n, k in enumerate(order)}
+    pipelines = {f"step_{n}": step.pipelines[k] for n, k in enumerate(order)}
     for extra in extras:
-        parts[extra.name] = Pipeline(1, [extra.stage], world.scenario.name).parts
-    blocks = _Blocks([x for part in _compiled(world, parts) for x in _of(part)])
+        pipelines[extra.name] = Pipeline(1, [extra.stage], world.scenario.name)
+    parts = {name: _compiled(world, row) for name, row in pipelines.items()}
+    every = [part for row in parts.values() for part in row]
+    blocks = _Blocks([x for part in every for x in part.arrays.values()])
     functions: dict[int, CompiledPart] = {}
-    for part in _compiled(world, parts):
+    for part in every:
         functions.setdefault(id(part.kernel), part)
     indices = {kernel: k for k, kernel in enumerate(functions)}
     calls = {
-        name: [
-            Call(indices[id(part.kernel)], *blocks.add_table(part))
-            for part in row
-            if isinstance(part, CompiledPart)
-        ]
+        name: [Call(indices[id(part.kernel)], *blocks.add_table(part)) for part in row]
         for name, row in parts.items()
     }
     roots = [("backend", vars(world.backend)), ("inputs", step.inputs)]
@@ -101,22 +99,17 @@ def layout_of(world: World, extras: Sequence[Extra] = ()) -> Layout:
     return Layout(bytes(blocks.image), blocks.offsets, arrays, calls, used)
 
 
-def _compiled(
-    world: World, parts: Mapping[str, Sequence[Stage | CompiledPart]]
-) -> Iterator[CompiledPart]:
-    """Yield all parts, which must be compiled."""
-    for row in parts.values():
-        for part in row:
-            if not isinstance(part, CompiledPart):
-                raise ValueError(
-                    f"{world.scenario.name}: a function is not compiled: "
-                    f"{world.referee.refused or part.function}"
-                )
-            yield part
-
-
-def _of(part: Any) -> Iterator[Array]:
-    yield from part.arrays.values()
+def _compiled(world: World, pipeline: Pipeline) -> list[CompiledPart]:
+    """Return the parts of a pipeline, which must be compiled."""
+    found = []
+    for part in pipeline.parts:
+        if not isinstance(part, CompiledPart):
+            raise ValueError(
+                f"{world.scenario.name}: a function is not compiled: "
+                f"{world.referee.refused or part.function}"
+            )
+        found.append(part)
+    return found
 
 
 def _arrays(name: str, value: Any) -> Iterator[tuple[str, Array]]:
@@ -140,7 +133,7 @@ class _Blocks:
     """Image of arrays; arrays that overlap keep their distance."""
 
     def __init__(self, arrays: list[Array]) -> None:
-        self.arrays = {a.ctypes.data: a for a in sorted(arrays, key=_size)}
+        self.arrays = {a.ctypes.data: a for a in sorted(arrays, key=lambda a: a.nbytes)}
         self.image, self.offsets = bytearray(), list[int]()
         self._starts: list[tuple[int, int]] = []
         """Address and offset of each array, by address."""
@@ -176,7 +169,3 @@ class _Blocks:
 
     def _align(self) -> None:
         self.image += bytes(-len(self.image) % ALIGNMENT)
-
-
-def _size(array: Array) -> int:
-    return array.nbytes
