@@ -16,9 +16,9 @@ from marl_airhockey.toolkit import (
     Metres,
     Observable,
     RandomStreams,
-    Scenario,
     Scene,
     Seconds,
+    ServingScenario,
     State,
     Table,
     Transition,
@@ -35,7 +35,7 @@ START = 0.7
 
 
 @dataclass(frozen=True, kw_only=True)
-class FreeForAll(Scenario):
+class FreeForAll(ServingScenario):
     """Game of several players on a polygon, each with a goal and some lives.
 
     A goal costs its owner a life. A player without lives is eliminated: its goal
@@ -201,11 +201,8 @@ class FreeForAll(Scenario):
     def needs_serve(self, t: Transition) -> Array:
         return np.asarray(t.new_memory["serve"] >= 0.0)
 
-    def serve(
-        self, rng: RandomStreams, state: State, memory: Memory
-    ) -> tuple[State, Memory]:
-        serves.serve(rng, self.scene, state, 0, self._toward(memory["serve"]))
-        return state, memory
+    def headings(self, memory: Memory) -> Array:
+        return self._toward(memory["serve"])[..., None]
 
     def eliminated(self, memory: Memory) -> Array | None:
         return np.asarray(memory["lives"] <= 0.0)
@@ -214,13 +211,13 @@ class FreeForAll(Scenario):
         """Return the lives and the stopped shots on goal, by seat."""
         return {"lives": memory["lives"], "shots": memory["shots"]}
 
-    def decided_by(self, memory: Memory) -> str:
-        """Return "lives", "shots on goal" for equal lives, or "" if both are equal."""
-        leading = memory["lives"] == memory["lives"].max()
-        if leading.sum() == 1:
-            return "lives"
-        shots = memory["shots"][leading]
-        return "shots on goal" if (shots == shots.max()).sum() == 1 else ""
+    def deciders(self, memory: Memory) -> dict[str, Array]:
+        """Return the lives, and the shots on goal for equal lives."""
+        lives, shots = memory["lives"], memory["shots"]
+        leading = lives == lives.max(-1, keepdims=True)
+        merit = np.where(leading, shots, -1.0)
+        best = merit == merit.max(-1, keepdims=True)
+        return {"lives": leading.sum(-1) == 1, "shots on goal": best.sum(-1) == 1}
 
     def success(self, t: Transition) -> Array:
         """(..., seats) bool: The seat is the last one, or leads at the time limit."""

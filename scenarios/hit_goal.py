@@ -9,6 +9,7 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Caption,
     GoalScenario,
     Mark,
     Memory,
@@ -123,11 +124,9 @@ class HitGoal(FewShots, GoalScenario):
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         return [Mark.circle(memory["goal"], self.radius)]
 
-    def caption(self, memory: Memory) -> str:
-        if np.isinf(memory["near"]):
-            return "not struck yet"
-        near, needed = 100 * memory["near"], 100 * self.radius
-        return f"closest {near:.0f} cm, needs {needed:.0f} cm"
+    def caption(self, memory: Memory) -> Caption:
+        numbers = 100 * memory["near"], 100 * self.radius
+        return Caption("closest {:.0f} cm, needs {:.0f} cm", *numbers)
 
 
 make = HitGoal

@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Caption,
     GoalLine,
     Mark,
     Memory,
@@ -109,11 +110,14 @@ class Juggle(Scenario):
         return np.asarray(inside & back & (t.after.time > 2.5))
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
-        armed = memory["struck_at"][memory["armed"] > 0]
-        return [Mark.across(self.table_geometry, x + self.lift) for x in armed]
+        heights, armed = memory["struck_at"] + self.lift, memory["armed"] > 0
+        return [
+            Mark.across(self.table_geometry, heights[..., k], armed[..., k])
+            for k in range(self.pucks)
+        ]
 
-    def caption(self, memory: Memory) -> str:
-        return f"hits {memory['hits']:.0f} of {self.hits}"
+    def caption(self, memory: Memory) -> Caption:
+        return Caption("hits {:.0f} of {:.0f}", memory["hits"], self.hits)
 
 
 make = Juggle

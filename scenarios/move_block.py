@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Caption,
     GoalLine,
     Memory,
     Metres,
@@ -151,8 +152,9 @@ class MoveBlock(FewShots):
         moved = length(t.after.block[..., 0, :] - t.before.block[..., 0, :]) > least
         return np.asarray(moved & (t.after.time > 0.25))
 
-    def caption(self, memory: Memory) -> str:
-        return f"block moved {100 * memory['moved']:.1f} of {100 * self.way:.0f} cm"
+    def caption(self, memory: Memory) -> Caption:
+        numbers = 100 * memory["moved"], 100 * self.way
+        return Caption("block moved {:.1f} of {:.0f} cm", *numbers)
 
 
 make = MoveBlock

@@ -9,6 +9,7 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Caption,
     Memory,
     RandomStreams,
     Seconds,
@@ -76,8 +77,9 @@ class PuckVelocity(FallingPuck):
         high = t.after.puck[..., 0, 0] > 0.5
         return np.asarray(high & (t.after.time > 1.25))
 
-    def caption(self, memory: Memory) -> str:
-        return f"speed {max(memory['rise'], 0.0):.2f} of {self.fast:.2f} m/s"
+    def caption(self, memory: Memory) -> Caption:
+        rise = np.maximum(memory["rise"], 0.0)
+        return Caption("speed {:.2f} of {:.2f} m/s", rise, self.fast)
 
 
 make = PuckVelocity

@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Caption,
     Memory,
     Metres,
     RandomStreams,
@@ -126,14 +127,15 @@ class Rally(Scenario):
         return np.asarray(slow | (t.new_memory["idle"] >= self.patience - 1e-9))
 
     def scores(self, memory: Memory) -> dict[str, Array]:
-        return {"crossings": memory["crossings"]}
+        return {"crossings": memory["crossings"][..., None]}
 
     def success(self, t: Transition) -> Array:
         """(...) bool: There have been ``crossings`` counted crossings."""
         return np.asarray(t.new_memory["crossings"] >= self.crossings)
 
-    def caption(self, memory: Memory) -> str:
-        return f"crossings {memory['crossings']:.0f} of {self.crossings}"
+    def caption(self, memory: Memory) -> Caption:
+        numbers = memory["crossings"], self.crossings
+        return Caption("crossings {:.0f} of {:.0f}", *numbers)
 
 
 make = Rally

@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Caption,
     GoalScenario,
     Mark,
     Memory,
@@ -139,9 +140,9 @@ class Reach(GoalScenario):
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         return [Mark.circle(memory["goal"], self.radius)]
 
-    def caption(self, memory: Memory) -> str:
-        gap, needed = 100 * memory["gap"], 100 * self.radius
-        return f"distance {gap:.1f} cm, needs {needed:.0f} cm"
+    def caption(self, memory: Memory) -> Caption:
+        numbers = 100 * memory["gap"], 100 * self.radius
+        return Caption("distance {:.1f} cm, needs {:.0f} cm", *numbers)
 
 
 make = Reach

@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Caption,
     Mark,
     Memory,
     Metres,
@@ -128,11 +129,14 @@ class ReachSequence(Scenario):
         return memory["goals"]
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
-        left = memory["goals"][int(memory["passed"]) :]
-        return [Mark.circle(goal, self.radius) for goal in left]
+        goals, passed = memory["goals"], memory["passed"]
+        return [
+            Mark.circle(goals[..., k, :], self.radius, shown=passed <= k)
+            for k in range(self.count)
+        ]
 
-    def caption(self, memory: Memory) -> str:
-        return f"goal {int(memory['passed'])} of {self.count}"
+    def caption(self, memory: Memory) -> Caption:
+        return Caption("goal {:.0f} of {:.0f}", memory["passed"], self.count)
 
 
 make = ReachSequence

@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Caption,
     GoalScenario,
     Mark,
     Memory,
@@ -167,8 +168,8 @@ class ReachVelocity(GoalScenario):
         goal, velocity = memory["goal"], memory["goal_velocity"]
         return [Mark.circle(goal, self.radius), Mark.arrow(goal, 0.2 * velocity)]
 
-    def caption(self, memory: Memory) -> str:
-        return f"best match {100 * memory['score']:.0f} %"
+    def caption(self, memory: Memory) -> Caption:
+        return Caption("best match {:.0f} %", 100 * memory["score"])
 
 
 make = ReachVelocity

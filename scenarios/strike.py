@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Caption,
     Memory,
     Metres,
     RandomStreams,
@@ -111,8 +112,8 @@ class Strike(Scenario):
         """(...) bool: The puck is faster than 0.2 m/s."""
         return np.asarray(length(t.after.puck_velocity[..., 0, :]) > 0.2)
 
-    def caption(self, memory: Memory) -> str:
-        return f"speed {memory['speed']:.2f} of {self.fast:.2f} m/s"
+    def caption(self, memory: Memory) -> Caption:
+        return Caption("speed {:.2f} of {:.2f} m/s", memory["speed"], self.fast)
 
 
 make = Strike

@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Caption,
     Memory,
     Metres,
     RandomStreams,
@@ -141,10 +142,9 @@ class StrikeCrowd(Scenario):
         tenth = 0.1 * length(self.table_geometry.size)
         return np.asarray((spread > tenth) & (t.after.time > 0.15))
 
-    def caption(self, memory: Memory) -> str:
-        return (
-            f"blocks moved {100 * memory['spread']:.1f} of {100 * self.spread:.0f} cm"
-        )
+    def caption(self, memory: Memory) -> Caption:
+        numbers = 100 * memory["spread"], 100 * self.spread
+        return Caption("blocks moved {:.1f} of {:.0f} cm", *numbers)
 
 
 make = StrikeCrowd

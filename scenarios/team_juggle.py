@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Caption,
     GoalLine,
     Mark,
     Memory,
@@ -128,18 +129,21 @@ class TeamJuggle(Scenario):
         return rewards.lost(t)
 
     def scores(self, memory: Memory) -> dict[str, Array]:
-        return {"passes": memory["passes"]}
+        return {"passes": memory["passes"][..., None]}
 
     def success(self, t: Transition) -> Array:
         """(...) bool: There have been ``passes`` hits in alternation."""
         return np.asarray(t.new_memory["passes"] >= self.passes)
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
-        armed = memory["struck_at"][memory["armed"] > 0]
-        return [Mark.across(self.table_geometry, x + self.lift) for x in armed]
+        heights, armed = memory["struck_at"] + self.lift, memory["armed"] > 0
+        return [
+            Mark.across(self.table_geometry, heights[..., k], armed[..., k])
+            for k in range(self.pucks)
+        ]
 
-    def caption(self, memory: Memory) -> str:
-        return f"passes {memory['passes']:.0f} of {self.passes}"
+    def caption(self, memory: Memory) -> Caption:
+        return Caption("passes {:.0f} of {:.0f}", memory["passes"], self.passes)
 
 
 make = TeamJuggle

@@ -42,10 +42,10 @@ def drawn(
         "blocks": rounded(state.position[state.bodies.block]),
         "angles": rounded(state.angle[state.bodies.block]),
         "marks": [
-            [m.kind, *rounded(np.array([*m.start, *m.end, m.radius])), m.means]
-            for m in scenario.all_marks(state, memory)
+            [m.kind, *rounded(np.array(m.numbers)), m.means]
+            for m in scenario.shown_marks(state, memory)
         ],
-        "caption": scenario.caption(memory),
+        "caption": str(scenario.caption(memory)),
         "decided_by": scenario.decided_by(memory),
         "returns": rounded(returns),
         "success": np.flatnonzero(success).tolist(),

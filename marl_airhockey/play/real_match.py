@@ -255,7 +255,7 @@ class RealMatch(LiveMatch):
         world = self.world
         state = world.state.map(lambda x: x[0])
         memory = {name: value[0] for name, value in world.memory.items()}
-        marks = world.scenario.all_marks(state, memory)
+        marks = world.scenario.shown_marks(state, memory)
         drawn: Array = self.backend.photograph(0, "table", marks, WIDTH)
         quality = [cv2.IMWRITE_JPEG_QUALITY, QUALITY]
         done, packed = cv2.imencode(".jpg", drawn[..., ::-1], quality)

@@ -80,9 +80,9 @@ class SceneView:
         world = match.world
         state = world.state.map(lambda x: x[0])
         memory = {name: value[0] for name, value in world.memory.items()}
-        marks = world.scenario.all_marks(state, memory)
+        marks = world.scenario.shown_marks(state, memory)
         qpos = _backend(match).worlds[0].data.qpos
-        request = tuple(qpos), marks
+        request = tuple(qpos), [(mark.kind, mark.numbers) for mark in marks]
         if request == self._shown:
             return
         self._shown, self._idle = request, False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from marl_airhockey.sim.contracts.driver import Driver, PrescribedMotion, View
-from marl_airhockey.sim.contracts.mark import Mark
+from marl_airhockey.sim.contracts.mark import Caption, Mark
 from marl_airhockey.sim.contracts.observable import Observable
 from marl_airhockey.sim.contracts.scenario import GoalScenario, Scenario, Transition
 from marl_airhockey.sim.contracts.units import (
@@ -24,10 +24,12 @@ from marl_airhockey.sim.core.seat import Seat
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.core.table import Obstacle, Table
 from marl_airhockey.sim.jit.elementary import cos, exp, expm1, hypot, log, log1p, sin
+from marl_airhockey.toolkit.serves import ServingScenario
 from marl_airhockey.types import Array, Memory
 
 __all__ = [
     "Array",
+    "Caption",
     "Degrees",
     "Driver",
     "GoalLine",
@@ -45,6 +47,7 @@ __all__ = [
     "Scene",
     "Seat",
     "Seconds",
+    "ServingScenario",
     "Share",
     "Speed",
     "State",

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
+from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.limits import away
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.scene import Scene
@@ -15,7 +18,7 @@ from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.sim.jit.elementary import cos, sin
 from marl_airhockey.sim.jit.pipeline import Fixed, Stage
 from marl_airhockey.toolkit.starts import SPIN
-from marl_airhockey.types import Array
+from marl_airhockey.types import Array, Memory
 
 PITCH = 0.12
 """Distance between two served pucks, and between two lines of them, m."""
@@ -27,6 +30,27 @@ GAP = 0.005
 """Smallest distance between a served puck and any other body, m."""
 SPEED = 0.5
 """Speed of a served puck, m/s."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ServingScenario(Scenario):
+    """Base of games that continue after a goal with a serve."""
+
+    @abstractmethod
+    def headings(self, memory: Memory) -> Array:
+        """Return the directions of serves (..., pucks), table frame, rad.
+
+        They are nan for pucks that are not served.
+        """
+
+    def serve(
+        self, rng: RandomStreams, state: State, memory: Memory
+    ) -> tuple[State, Memory]:
+        headings = self.headings(memory)
+        for k in range(self.scene.pucks):
+            rows = np.isfinite(headings[:, k])
+            serve(rng, self.scene, state, k, headings[:, k], rows)
+        return state, memory
 
 
 def most_served(scene: Scene) -> int:

@@ -9,17 +9,18 @@ from functools import cached_property
 import numpy as np
 
 from marl_airhockey.sim.contracts.observable import Observable
-from marl_airhockey.sim.contracts.scenario import Scenario, Transition
+from marl_airhockey.sim.contracts.scenario import Transition
 from marl_airhockey.sim.contracts.units import Latency, Metres, Seconds, Weight
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.scene import GoalLine, Scene
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.toolkit import observables, rewards, serves
+from marl_airhockey.toolkit.serves import ServingScenario
 from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
-class Versus(Scenario):
+class Versus(ServingScenario):
     """Game of two teams, each with a goal at its own end.
 
     A team that scores gets a reward of 1, and the other team -1. The first team that
@@ -174,25 +175,20 @@ class Versus(Scenario):
     def needs_serve(self, t: Transition) -> Array:
         return np.asarray((t.new_memory["serve"] != 0.0).any(-1))
 
-    def serve(
-        self, rng: RandomStreams, state: State, memory: Memory
-    ) -> tuple[State, Memory]:
+    def headings(self, memory: Memory) -> Array:
         toward = memory["serve"]
-        for k in range(self.pucks):
-            heading = np.where(toward[:, k] > 0.0, 0.0, np.pi)
-            serves.serve(rng, self.scene, state, k, heading, toward[:, k] != 0.0)
-        return state, memory
+        heading = np.where(toward > 0.0, 0.0, np.pi)
+        return np.where(toward != 0.0, heading, np.nan)
 
     def scores(self, memory: Memory) -> dict[str, Array]:
         """Return the goals and the stopped shots on goal, by team."""
         return {"goals": memory["goals"], "shots": memory["stopped"]}
 
-    def decided_by(self, memory: Memory) -> str:
-        """Return "goals", "shots on goal" for equal goals, or "" if both are equal."""
-        for name, rule in (("goals", "goals"), ("stopped", "shots on goal")):
-            if memory[name][0] != memory[name][1]:
-                return rule
-        return ""
+    def deciders(self, memory: Memory) -> dict[str, Array]:
+        """Return the goals, and the shots on goal for equal goals."""
+        rules = {"goals": "goals", "shots on goal": "stopped"}
+        counts = {rule: memory[name] for rule, name in rules.items()}
+        return {rule: n[..., 0] != n[..., 1] for rule, n in counts.items()}
 
     def success(self, t: Transition) -> Array:
         """(..., seats) bool: The team leads at the end of the game.

@@ -137,7 +137,7 @@ class Study(Host):
         course.end_game(
             self._result,
             rule=scenario.decided_by(memory),
-            score=scenario.caption(memory),
+            score=str(scenario.caption(memory)),
             scores=scores,
             device=self.seats.devices[PARTICIPANT_SEAT],
             seconds=round(match.ticks / RATE, 2),

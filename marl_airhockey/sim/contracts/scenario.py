@@ -14,7 +14,7 @@ from typing import ClassVar, NamedTuple, final
 
 import numpy as np
 
-from marl_airhockey.sim.contracts.mark import Mark, Meaning
+from marl_airhockey.sim.contracts.display import Display
 from marl_airhockey.sim.contracts.observable import Observable
 from marl_airhockey.sim.contracts.options import check_places, checked_options
 from marl_airhockey.sim.contracts.units import Latency, Seconds, Weight
@@ -44,7 +44,7 @@ class Transition(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scenario(ABC):
+class Scenario(Display, ABC):
     """Scenario, whose fields are its options.
 
     The memory contains arrays (..., *) by name. For every scenario with pucks it
@@ -168,14 +168,6 @@ class Scenario(ABC):
         """
         raise NotImplementedError(f"{type(self).__name__} serves no puck")
 
-    def eliminated(self, memory: Memory) -> Array | None:
-        """(..., seats) bool: the seat is eliminated; None if no seat ever is.
-
-        The paddle of an eliminated seat is behind its side, whose goal line becomes a
-        wall.
-        """
-        return None
-
     @abstractmethod
     def success(self, t: Transition) -> Array:
         """(...) or (..., seats) bool: success in this step; the episode latches it."""
@@ -192,29 +184,6 @@ class Scenario(ABC):
     def targets(self, memory: Memory) -> Array | None:
         """Return points (W, n, 2), m, that obstacles must leave free; None for none."""
         return None
-
-    def marks(self, state: State, memory: Memory) -> list[Mark]:
-        """Return the marks to draw for one world, without leading axes."""
-        return []
-
-    def scores(self, memory: Memory) -> dict[str, Array]:
-        """Return the counts of one world's game by name, per team, seat or in total."""
-        touches = memory.get("touches")
-        return {} if touches is None else {"touches": touches.sum()}
-
-    def caption(self, memory: Memory) -> str:
-        """Return the score of one world as a short text."""
-        return ", ".join(
-            f"{name} " + " : ".join(f"{count:.0f}" for count in np.ravel(counts))
-            for name, counts in self.scores(memory).items()
-        )
-
-    def decided_by(self, memory: Memory) -> str:
-        """Return the rule that decides one world's game, for example "goals".
-
-        It is "" if the game is not decided.
-        """
-        return ""
 
     @final
     @property
@@ -281,16 +250,6 @@ class Scenario(ABC):
     def added_drag(self, state: State) -> Array:
         """Return the linear drag (..., pucks) that regions add, 1/s."""
         return _sums(state.puck, self.drag_regions)
-
-    @final
-    def all_marks(self, state: State, memory: Memory) -> list[Mark]:
-        """Return the marks to draw for one world: `marks` and the regions."""
-        paid = self.reward_regions
-        means: list[Meaning] = ["reward" if r[3] > 0.0 else "cost" for r in paid]
-        means += ["drag"] * len(self.drag_regions)
-        regions = zip((*paid, *self.drag_regions), means, strict=True)
-        circles = [Mark.circle(np.array(r[:2]), r[2], kind) for r, kind in regions]
-        return [*circles, *self.marks(state, memory)]
 
     @final
     def is_terminated(self, t: Transition) -> Array:

@@ -77,7 +77,7 @@ class Renderer:
         return Frame(
             scene=world.scene,
             state=state,
-            marks=world.scenario.all_marks(state, memory),
+            marks=world.scenario.shown_marks(state, memory),
             trails=self._trails,
             title=self.title,
             note=note,

@@ -108,10 +108,11 @@ class OffscreenRenderer:
         if scene.ngeom == scene.maxgeom:
             return
         geom = scene.geoms[scene.ngeom]
-        start = self._frame.to_world(*mark.start, THIN)
+        x, y, end_x, end_y, radius = mark.numbers
+        start = self._frame.to_world(x, y, THIN)
         colour = COLOURS[mark.means]
         if mark.kind == "circle":
-            kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [mark.radius, THIN, THIN]
+            kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [radius, THIN, THIN]
             orientation = self._frame.rotation.ravel()
             mujoco.mjv_initGeom(geom, kind, size, start, orientation, colour)
         else:
@@ -123,7 +124,7 @@ class OffscreenRenderer:
             mujoco.mjv_initGeom(
                 geom, kind, np.zeros(3), start, np.eye(3).ravel(), colour
             )
-            end = self._frame.to_world(*mark.end, THIN)
+            end = self._frame.to_world(end_x, end_y, THIN)
             mujoco.mjv_connector(geom, kind, 2 * THIN, start, end)
         scene.ngeom += 1
 
