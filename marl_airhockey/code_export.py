@@ -1,4 +1,4 @@
-"""Export of the control step of a scenario as code for another machine."""
+"""Export of the control step of scenarios as code for another machine."""
 
 from __future__ import annotations
 
@@ -7,14 +7,18 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from marl_airhockey.build import build_world
 from marl_airhockey.sim.backends.numba.backend import NumbaBackend
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.jit.fused import Fused, Sink, Source
 from marl_airhockey.sim.jit.targets import (
     TARGETS,
     UNOPTIMISED,
@@ -23,14 +27,33 @@ from marl_airhockey.sim.jit.targets import (
     object_code,
     text_of,
 )
+from marl_airhockey.sim.world.actions import Elimination
 from marl_airhockey.sim.world.keywords import Keywords
-from marl_airhockey.sim.world.layout import Extra, layout_of
+from marl_airhockey.sim.world.layout import Extra, Layout, layout_of
 from marl_airhockey.sim.world.world import World
-from marl_airhockey.toolkit.serves import serve_stage
+from marl_airhockey.toolkit.serves import ServingScenario, serve_stage
 from marl_airhockey.toolkit.starts import SPIN
+from marl_airhockey.types import Memory
 
 SEED = 0
 """Seed of the episode in the image."""
+
+
+class ExportedGame(NamedTuple):
+    """Arrays of one scenario."""
+
+    facts: dict[str, Any]
+    """Description, see `docs/same_results.md`."""
+    image: bytes
+    """Arrays at the start of the episode with the seed `SEED`."""
+
+
+class ExportedCode(NamedTuple):
+    """Code of several scenarios, which share functions."""
+
+    code: bytes
+    games: dict[str, ExportedGame]
+    """Games by scenario."""
 
 
 def export_code(scenario: str, target: str, out: Path, keywords: Keywords) -> Path:
@@ -52,12 +75,8 @@ def export_code(scenario: str, target: str, out: Path, keywords: Keywords) -> Pa
         ValueError: The target is unknown, or the control step is not compiled.
         ModuleNotFoundError: The linker for WebAssembly is not installed.
     """
-    check_target(target)
-    with tempfile.TemporaryDirectory() as folder:
-        texts, facts, image = _translated(scenario, keywords, Path(folder))
-    code = object_code(texts, target)
-    if target == "wasm32":
-        code = linked(code, list(texts))
+    code, games = exported([scenario], target, keywords)
+    facts, image = games[scenario]
     out.mkdir(parents=True, exist_ok=True)
     name = f"{scenario}{TARGETS[target].suffix}"
     (out / name).write_bytes(code)
@@ -68,33 +87,73 @@ def export_code(scenario: str, target: str, out: Path, keywords: Keywords) -> Pa
     return path
 
 
-def _translated(
-    scenario: str, keywords: Keywords, folder: Path
-) -> tuple[dict[str, str], dict[str, Any], bytes]:
-    """Compile in a process without optimisation; return texts, facts and image."""
-    program = f"from {__name__} import _write; _write({scenario!r}, {keywords!r}, '.')"
+def exported(
+    scenarios: Sequence[str], target: str, keywords: Keywords, starts: int = 1
+) -> ExportedCode:
+    """Return the compiled control steps of one world of each scenario.
+
+    Args:
+        scenarios: Names of scenarios.
+        target: Name of a target, see `targets.TARGETS`.
+        keywords: Keywords of the worlds. All seats are open.
+        starts: Number of episodes whose starts are included, with seeds from `SEED`.
+
+    Raises:
+        ValueError: The target is unknown, or a control step is not compiled.
+        ModuleNotFoundError: The linker for WebAssembly is not installed.
+    """
+    check_target(target)
+    given = list(scenarios), keywords, starts
+    program = f"from {__name__} import _write; _write(*{given!r})"
     own = {"MARL_AIRHOCKEY_CACHE": "code", "PYTHONPATH": os.pathsep.join(sys.path)}
     variables = {**os.environ, **UNOPTIMISED, **own}
-    words = [sys.executable, "-c", program]
-    subprocess.run(words, check=True, cwd=folder, env=variables)
-    facts = json.loads((folder / "facts.json").read_text())
-    texts = {name: (folder / f"{name}.ll").read_text() for name in facts["functions"]}
-    return texts, facts, (folder / "image").read_bytes()
+    with tempfile.TemporaryDirectory() as name:
+        # A process of its own compiles without optimisation.
+        words = [sys.executable, "-c", program]
+        subprocess.run(words, check=True, cwd=name, env=variables)
+        folder = Path(name)
+        texts = {path.stem: path.read_text() for path in sorted(folder.glob("*.ll"))}
+        games = {
+            scenario: ExportedGame(
+                json.loads((folder / f"{scenario}.json").read_text()),
+                (folder / f"{scenario}.bin").read_bytes(),
+            )
+            for scenario in scenarios
+        }
+    code = object_code(texts, target)
+    if target == "wasm32":
+        code = linked(code, list(texts))
+    return ExportedCode(code, games)
 
 
-def _write(scenario: str, keywords: Keywords, folder: str) -> None:
-    """Write the files that `_translated` reads."""
-    world = build_world(scenario, 1, False, keywords)
-    world.reset(seed=SEED)
-    layout = layout_of(world, list(_extras(world)))
-    names = [f"part_{k}" for k in range(len(layout.parts))]
-    for name, part in zip(names, layout.parts, strict=True):
-        Path(folder, f"{name}.ll").write_text(text_of(part.kernel))
-    facts = {
-        "functions": names,
+def _write(scenarios: Sequence[str], keywords: Keywords, starts: int) -> None:
+    """Write the files that `exported` reads into the current folder."""
+    names: dict[int, str] = {}
+    for scenario in scenarios:
+        world = build_world(scenario, 1, False, keywords)
+        world.reset(seed=SEED)
+        extras = list(_extras(world))
+        layout = layout_of(world, extras)
+        for part in layout.parts:
+            if id(part.kernel) not in names:
+                name = names[id(part.kernel)] = f"part_{len(names)}"
+                Path(f"{name}.ll").write_text(text_of(part.kernel))
+        functions = [names[id(part.kernel)] for part in layout.parts]
+        facts = _facts(world, layout, functions)
+        facts["starts"] = _starts(world, layout.image, extras, starts)
+        Path(f"{scenario}.bin").write_bytes(layout.image)
+        Path(f"{scenario}.json").write_text(json.dumps(facts))
+
+
+def _facts(world: World, layout: Layout, functions: list[str]) -> dict[str, Any]:
+    """Return the description of a world, except for its starts."""
+    scenario, (state, memory) = world.scenario, world.get_state()
+    scene = scenario.scene
+    return {
+        "functions": list(dict.fromkeys(functions)),
         "calls": {
             name: [
-                {"function": names[c.part], "table": c.table, "length": c.length}
+                {"function": functions[c.part], "table": c.table, "length": c.length}
                 for c in calls
             ]
             for name, calls in layout.calls.items()
@@ -104,25 +163,81 @@ def _write(scenario: str, keywords: Keywords, folder: str) -> None:
         "observation": list(world.observation_labels),
         "reaction": round(world.observer.reaction / world.control_dt),
         "control_dt": world.control_dt,
+        "max_cycles": world.max_cycles,
         "spin": SPIN,
+        "shown": [
+            name.removeprefix("show_0.")
+            for name in layout.arrays
+            if name.startswith("show_0.")
+        ],
+        "marks": [(m.kind, m.means) for m in scenario.all_marks(state, memory)],
+        "caption": scenario.caption(memory).text,
+        "deciders": list(scenario.deciders(memory)),
+        "elimination": _elimination(scenario, memory),
+        "bodies": {
+            "pucks": [scene.bodies.puck.start, scene.bodies.puck.stop],
+            "blocks": [scene.bodies.block.start, scene.bodies.block.stop],
+        },
     }
-    Path(folder, "image").write_bytes(layout.image)
-    Path(folder, "facts.json").write_text(json.dumps(facts))
+
+
+def _elimination(scenario: Scenario, memory: Memory) -> dict[str, Any] | None:
+    """Return where eliminated paddles are; None if no seat is ever eliminated."""
+    if scenario.eliminated(memory) is None:
+        return None
+    found = Elimination(scenario.scene)
+    return {"parking": found.parking.tolist(), "owner": found.owner.tolist()}
+
+
+def _starts(
+    world: World, image: bytes, extras: list[Extra], count: int
+) -> dict[str, Any]:
+    """Return the 64-bit words of the image that differ between starts.
+
+    ``words`` are their indices, and ``values`` their values as hexadecimal digits, one
+    text for each seed.
+    """
+    images = []
+    for k in range(count):
+        world.reset(seed=SEED + k)
+        images.append(layout_of(world, extras).image)
+    rows = np.array([np.frombuffer(one, np.uint64) for one in images])
+    words = np.flatnonzero((rows != np.frombuffer(image, np.uint64)).any(0))
+    return {
+        "words": words.tolist(),
+        "values": [row[words].tobytes().hex() for row in rows],
+    }
 
 
 def _extras(world: World) -> Iterator[Extra]:
-    """Yield the observation and, in games, the functions of a serve."""
+    """Yield the observation, the display and, in games, the functions of a serve."""
     step, observer = world.control_step, world.observer
+    # The current moment is moment 0.
+    moments = step.now, step.moments[1 - step.current]
     if world.sensor.ideal:
         state = step.now.state, step.now.verdict.memory
         yield Extra("observe", *observer.detached(*state, observer.observe))
+    show = Fused(partial(_shown, world), f"display of {world.scenario.name}")
+    for n, moment in enumerate(moments):
+        sources = vars(moment.state), moment.verdict.memory
+        (shown,) = show.prepare(*sources)
+        if shown:
+            yield Extra(f"show_{n}", show.stage(sources, (shown,)), shown)
     if not world.serves or not isinstance(world.backend, NumbaBackend):
         return
     units = {"unit": np.zeros((1, 2))}
     yield Extra("draw", world.serve_stream.stage(units["unit"]), units)
-    # The current moment is moment 0.
-    for n, moment in enumerate((step.now, step.moments[1 - step.current])):
+    for n, moment in enumerate(moments):
         for puck in range(world.scene.pucks):
             serve = serve_stage(world.scene, moment.state, puck)
             yield Extra(f"serve_{n}_{puck}", *serve)
         yield Extra(f"place_{n}", world.backend.serve_stage(moment.state), {})
+
+
+def _shown(world: World, state: Source, memory: Source) -> tuple[Sink, ...]:
+    """Return the display, and the headings of serves."""
+    scenario = world.scenario
+    shown = scenario.display_arrays(State(**state), dict(memory))
+    if isinstance(scenario, ServingScenario):
+        shown["headings"] = scenario.headings(dict(memory))
+    return (shown,)

@@ -11,12 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.modules import modules
 
 import marl_airhockey as ah
 from marl_airhockey.build import build_world
 from marl_airhockey.code_export import export_code
 from marl_airhockey.sim.jit import targets
 from marl_airhockey.sim.world.layout import layout_of
+from marl_airhockey.toolkit import ServingScenario
 
 NODE, QEMU = shutil.which("node"), shutil.which("qemu-aarch64")
 RUNNER = Path(__file__).parent / "helpers" / "run_code.mjs"
@@ -86,15 +88,21 @@ def test_a_layout_needs_one_compiled_world(keywords, worlds, words):
 def run(path, actions, tmp_path):
     """Hash and number of serves of exported code in Node."""
     (tmp_path / "actions").write_bytes(actions.tobytes())
-    words = [NODE, RUNNER, path, tmp_path / "actions"]
+    words = [NODE, RUNNER, modules(tmp_path), path, tmp_path / "actions"]
     done = subprocess.run(words, check=True, capture_output=True, text=True)
     found = json.loads(done.stdout)
-    return found["hash"], found["served"]
+    return found["hash"], found["served"], found["eliminated"]
 
 
-def played(world, steps):
-    """Hash and number of serves in Python, and the actions after their latency."""
-    digest, given, served = hashlib.sha256(), [], 0
+def played(world, steps, names):
+    """Results as of `run`, and the actions after their latency.
+
+    Args:
+        world: One world.
+        steps: Number of steps.
+        names: Names of the arrays of the display.
+    """
+    digest, given, served, most = hashlib.sha256(), [], 0, 0
     rng = np.random.default_rng(0)
     seats = np.arange(len(world.scene.seats))
     for _ in range(steps):
@@ -108,7 +116,13 @@ def played(world, steps):
         digest.update(now.verdict.outcome["reward"].tobytes())
         if world.sensor.ideal:
             digest.update(world.observe(seats).tobytes())
-    return (digest.hexdigest(), served), np.array(given)
+        shown = world.scenario.display_arrays(state, world.memory)
+        if isinstance(world.scenario, ServingScenario):
+            shown["headings"] = world.scenario.headings(world.memory)
+        for name in names:
+            digest.update(shown[name].tobytes())
+        most = max(most, int(shown.get("eliminated", np.zeros(1)).sum()))
+    return (digest.hexdigest(), served, most), np.array(given)
 
 
 LONG = {"max_cycles": 12_000, "options": {"goals_to_win": 1000}}
@@ -122,6 +136,7 @@ POLICIES = {"paddle_0": "zoo/duel", "paddle_1": "zoo/duel_3"}
     [
         ("duel", LONG, POLICIES, 10_000),
         ("duel", {**LONG, "options": {"pucks": 2, "goals_to_win": 1000}}, {}, 3000),
+        ("free_for_all", {"max_cycles": 6000}, {}, 6000),
         ("hit_goal_velocity", {"profile": "ur5e"}, {}, 3000),
     ],
 )
@@ -132,11 +147,12 @@ def test_webassembly_computes_the_bits_of_python(
     path = export_code(name, "wasm32", tmp_path, keywords)
     world = build_world(name, 1, False, {**keywords, "drivers": drivers})
     world.reset(seed=0)
-    (wanted, served), given = played(world, steps)
-    assert served > 10 or name != "duel"
-    assert run(path, given, tmp_path) == (wanted, served)
+    found, given = played(world, steps, json.loads(path.read_text())["shown"])
+    assert found[1] > 10 or name != "duel"
+    assert found[2] > 1 or name != "free_for_all"
+    assert run(path, given, tmp_path) == found
     given[10, 0, 0, 0] += 1e-9
-    assert run(path, given, tmp_path)[0] != wanted
+    assert run(path, given, tmp_path)[0] != found[0]
 
 
 def header(facts):
@@ -182,7 +198,7 @@ def test_aarch64_computes_the_bits_of_python(tmp_path):
     subprocess.run([sys.executable, *words, *sources], check=True)
     world = build_world("hit_goal_velocity", 1, False, keywords)
     world.reset(seed=0)
-    (wanted, _), given = played(world, 3000)
+    (wanted, _, _), given = played(world, 3000, [])
     (tmp_path / "actions").write_bytes(given.tobytes())
     words = [QEMU, program, tmp_path / facts["image"], tmp_path / "actions"]
     done = subprocess.run(words, check=True, capture_output=True)

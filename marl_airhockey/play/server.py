@@ -28,7 +28,7 @@ from marl_airhockey.sim.contracts.palette import stylesheet
 
 WEB = Path(__file__).parent / "web"
 VERSION = hashlib.sha256(
-    b"".join(path.read_bytes() for path in sorted(WEB.iterdir()))
+    b"".join(path.read_bytes() for path in sorted(WEB.rglob("*.*")))
 ).hexdigest()[:12]
 """Version of the page, by which an open page notices a newer one."""
 PALETTE = stylesheet()

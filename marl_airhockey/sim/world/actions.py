@@ -63,7 +63,7 @@ class Actions:
         scene, longest = scenario.scene, physics.highest("action_delay")
         self._scenario, self._driven, self._open = scenario, driven, open_seats
         self._rotations = [scene.table.rotation(seat.side) for seat in scene.seats]
-        self._elimination = _Elimination(scene)
+        self._elimination = Elimination(scene)
         self._shape = (worlds, len(open_seats), 2)
         self.inputs = Inputs.empty(scene, worlds)
         """Inputs of the step, which `collect` fills."""
@@ -140,21 +140,23 @@ class Actions:
         prescribed[:, k, 2:] = products(measured[:, 2:], self._rotations[k].T)
 
 
-class _Elimination:
+class Elimination:
     """Positions of eliminated paddles behind their sides, and their goal lines."""
 
     def __init__(self, scene: Scene) -> None:
         table, sides = scene.table, [seat.side for seat in scene.seats]
         behind = table.offsets[sides] + 2 * table.paddle_radius
-        self._parking = np.zeros((len(sides), 4))
-        self._parking[:, :2] = -table.normals[sides] * behind[:, None]
+        self.parking = np.zeros((len(sides), 4))
+        """Position and velocity of each eliminated paddle, table frame, m and m/s."""
+        self.parking[:, :2] = -table.normals[sides] * behind[:, None]
         lines = [line.side for line in scene.goal_lines]
         owners = [sides.index(side) if side in sides else -1 for side in lines]
-        self._owner = np.array(owners, np.int64)
+        self.owner = np.array(owners, np.int64)
+        """Seat of each goal line, or -1."""
 
     def apply(self, eliminated: Array, inputs: Inputs) -> None:
         """Remove the paddles of eliminated seats (B, seats) and close their goals."""
         inputs.action[eliminated], inputs.raised[eliminated] = 0.0, True
-        parking = np.broadcast_to(self._parking, inputs.prescribed.shape)
+        parking = np.broadcast_to(self.parking, inputs.prescribed.shape)
         inputs.prescribed[eliminated] = parking[eliminated]
-        inputs.closed[:] = eliminated[:, self._owner] & (self._owner >= 0)
+        inputs.closed[:] = eliminated[:, self.owner] & (self.owner >= 0)
