@@ -1,10 +1,11 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo check ci test test-short test-realtime test-one test-all test-distributed lint docs wheel clean
+.PHONY: help setup demo check ci test test-short test-realtime test-one test-all test-distributed lint docs pages wheel clean
 
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 TRAINS := .venv/.trains
+EXPORTS := .venv/.exports
 FAR := .venv-distributed
 JOBS ?= 2
 PIP := $(BIN)/pip install --quiet --constraint constraints.txt
@@ -36,10 +37,15 @@ $(TRAINS): pyproject.toml constraints.txt
 
 # robosuite comes without what it names: that is numpy 1, a second OpenCV and a compiler.
 $(READY): $(TRAINS)
-	$(PIP) 'marl_airhockey[train,play,hardware,offline,ecosystem,export,dev]'
+	$(PIP) 'marl_airhockey[train,play,hardware,offline,ecosystem,dev]'
 	$(PIP) --no-deps robosuite
 	$(PIP) mujoco scipy termcolor tqdm
 	@echo "what pip says of robosuite above does no harm: it comes without what it names"
+	touch $@
+
+# The linker for WebAssembly, which slow tests and the game in the documentation need.
+$(EXPORTS): $(READY)
+	$(PIP) 'marl_airhockey[export]'
 	touch $@
 
 demo: $(TRAINS) ## Train a paddle to juggle and show it (a minute)
@@ -65,7 +71,7 @@ ci: ## Run what CI runs, on a clean clone of the last commit
 test-one: setup ## Run the tests of one scenario or driver: make test-one NAME=my_task
 	$(BIN)/pytest tests/suites -m 'not slow' --only $(NAME)
 
-test-all: setup lint $(FAR)/.ready ## Run every test
+test-all: setup lint $(EXPORTS) $(FAR)/.ready ## Run every test
 	$(TEST)
 	$(BIN)/pytest --closing $(REALTIME)
 	$(RLLIB)
@@ -100,7 +106,10 @@ wheel: setup ## Build a wheel into dist/ that starts without compiling (TARGET=g
 	$(BIN)/airhockey precompile --target $(TARGET) --out build/precompiled --profile ideal --profile ur5e
 	$(BIN)/python -m build --wheel --outdir dist .
 
-docs: setup ## Build the documentation into site/
+docs: pages $(EXPORTS) ## Build the documentation into site/, with the game in site/play
+	$(BIN)/airhockey play --static site/play
+
+pages: setup ## Build the documentation into site/, without the game
 	$(BIN)/python scripts/reproduce/scenario_pages.py
 	$(BIN)/typer marl_airhockey.cli.main utils docs --name airhockey --title "Command line" --output docs/cli.md
 	$(BIN)/mkdocs build --strict

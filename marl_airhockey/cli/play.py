@@ -98,12 +98,23 @@ def play(
     host: Host = "127.0.0.1",
     port: Port = 8480,
     browser: Browser = True,
+    static: Annotated[
+        Path | None,
+        typer.Option(
+            file_okay=False,
+            help="Folder of a page that plays without this library, on any web server. "
+            "The command only writes the folder.",
+        ),
+    ] = None,
 ) -> None:
     """Play in the browser against a policy, a script or other people.
 
     --driver AGENT=person gives a seat to a person. --reaction, --noise and --pace limit
     all drivers that are not people, instead of the limits of their level.
     """
+    if static is not None:
+        _write_page(static, scenario)
+        return
     require("starlette", "play")
     require("uvicorn", "play")
     from marl_airhockey.play.game_menu import GameMenu
@@ -140,6 +151,17 @@ def play(
                 match.set_driver(i, PERSON)
         pages = record, host, port, browser
         host_match(match, *pages, keep=keep, menu=menu, tournament=tournament)
+
+
+def _write_page(out: Path, scenario: str | None) -> None:
+    """Write a page without a server, with one game or all games."""
+    from marl_airhockey.play.static_page import write_static_page
+
+    others = [name for name in scenario_names() if name != FIRST]
+    files = write_static_page(out, [scenario] if scenario else [FIRST, *others])
+    size = sum(file.stat().st_size for file in files) / 1e6
+    console.print(f"wrote {out}: {len(files)} files, {size:.2f} MB", soft_wrap=True)
+    console.print(f"play: python -m http.server --directory {out}", soft_wrap=True)
 
 
 def _as_trained(scenario: str, names: set[str | None], given: Keywords) -> Keywords:

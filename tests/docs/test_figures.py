@@ -400,3 +400,16 @@ def test_distances_after_a_stop_are_those_of_the_limits():
         speed = float(line["speed"].removesuffix(" m/s"))
         distance = LATEST * speed + MotionLimits(speed=speed).stopping_distance
         assert line["stopping distance"] == f"{distance:.2f} m"
+
+
+def test_figures_of_the_page_without_a_server_are_those_of_its_row():
+    row = json.loads((DATA / "static_page.json").read_text())
+    shown = table("docs/browser_page.md", "measure", "value")
+    assert [line["value"] for line in shown] == [
+        f"{row['mb']:.2f} MB",
+        f"{row['loaded_mb']:.2f} MB",
+        f"{row['first_frame_s']:.2f} s",
+        f"{row['frames_per_s']:.1f}",
+        f"{row['ticks_per_s']:.1f}",
+        f"{100 * row['core_share']:.0f} %",
+    ]

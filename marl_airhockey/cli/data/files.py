@@ -197,16 +197,19 @@ def import_dataset(
     source: Annotated[
         str,
         typer.Argument(
-            help="Name of a Minari dataset; folder of a LeRobot dataset; or file or "
-            "folder of HDF5 trajectories, or of CSV rows t,x,y (s, m)."
+            help="Name of a Minari dataset; folder of a LeRobot dataset; file or "
+            "folder of HDF5 trajectories, or of CSV rows t,x,y (s, m); or games "
+            "that the page without a server has saved (.airhockey)."
         ),
     ],
     scenario: Annotated[
-        str,
+        str | None,
         typer.Option(
-            "--scenario", "-s", help="Name of the scenario to which the data belong."
+            "--scenario",
+            "-s",
+            help="Name of the scenario to which the data belong; not for saved games.",
         ),
-    ],
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -229,11 +232,23 @@ def import_dataset(
         ),
     ] = 0.05,
 ) -> None:
-    """Import a dataset of another library as a recording."""
+    """Import a dataset of another library, or saved games, as a recording.
+
+    Saved games are played again. If a state differs, nothing is written.
+    """
     from marl_airhockey.data.exchange.formats import import_dataset as imported
     from marl_airhockey.data.exchange.settings import ImportSettings
+    from marl_airhockey.data.saved_games import SUFFIX, import_games
 
     folder = out or Path("recordings") / source.strip("/.").replace("/", "-")
+    if source.endswith(SUFFIX):
+        if scenario is not None or option:
+            raise ValueError(f"{source}: saved games need no --scenario or --option")
+        show([import_games(Path(source), folder)], False)
+        console.print("the hash of the file agrees with the replay")
+        return
+    if scenario is None:
+        raise ValueError(f"{source}: give the scenario with --scenario")
     options = settings(option) if option else {}
     given = ImportSettings(source, scenario, folder, options, control_dt, root)
     show([imported(given)], False)

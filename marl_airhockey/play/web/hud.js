@@ -44,7 +44,7 @@ export function updateHud() {
   document.body.classList.toggle("playing", playing && now.phase !== "arrange");
   put($("pause").firstElementChild, match.camera ? "Stop" : game.recording ? (game.recording.runs ? "Pause" : "Play") : "Pause");
   $("pause").hidden = !game.recording && (!mayControl() || !["play", "countdown", "goal", "arrange"].includes(now.phase));
-  $("leave").hidden = now.seat === null || Boolean(game.recording || match.study);
+  $("leave").hidden = now.seat === null || Boolean(game.recording || match.study || match.alone);
   $("table").classList.toggle("mine", now.seat !== null && now.phase === "play");
   details();
   link();

@@ -145,6 +145,7 @@ async function begin() {
   const { mode } = await (await fetch("mode" + location.search)).json();
   document.body.classList.add(mode);
   if (mode === "live") connect();
+  else if (mode === "static") await (await import("./static/main.js")).begin();
   else await open();
 }
 

@@ -4,8 +4,9 @@ import { $, game, receive, receiveMatch } from "./state.js";
 
 let playback = null; // { steps, at, runs, end, shown, rate }
 
-export async function open() {
-  const { meta, steps, end } = await (await fetch("recording" + location.search)).json();
+export async function open() { show(await (await fetch("recording" + location.search)).json()); }
+
+export function show({ meta, steps, end }) {
   const rate = 1 / meta.control_dt;
   const seats = meta.players.map((player) => ({ driver: player.driver, level: "", taken: player.person !== null }));
   const notes = { seats, seat: null, ack: 0, watching: 0, rate, recording: false, queue: 0 };
@@ -17,6 +18,11 @@ export async function open() {
   $("scrub").oninput = () => { playback.at = Number($("scrub").value); };
   $("scrub").onchange = () => $("scrub").blur();
   $("speed").onchange = () => $("speed").blur();
+}
+
+export function close() {
+  playback = game.recording = null;
+  $("timeline").hidden = true;
 }
 
 export function togglePlayback() {

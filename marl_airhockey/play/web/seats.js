@@ -21,7 +21,7 @@ export function seatRows() {
 function chooser(seat, i, match) {
   const list = element("select"), now = seat.level || seat.driver;
   list.setAttribute("aria-label", `player ${i + 1}`);
-  for (const name of new Set(["person", now, ...match.ladder])) {
+  for (const name of new Set([...(match.alone ? [] : ["person"]), now, ...match.ladder])) {
     list.append(new Option(name === "person" ? "Another person" : levelTitle(name), name, false, name === now));
   }
   list.onchange = () => { send("opponent", { seat: i, name: list.value }); list.blur(); };

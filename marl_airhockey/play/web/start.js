@@ -121,7 +121,7 @@ function together() {
   const rows = element("div", "", "seats");
   rows.append(...seatRows());
   if (game.now.seat !== null && game.now.seats.length > 1) rows.append(button("Swap sides", () => send("swap")));
-  return [...parts, element("p", match.what, "aim"), rows, ...invitation(match), ...(match.invite ? [] : [element("p", LOCAL, "facts")])];
+  return [...parts, element("p", match.what, "aim"), rows, ...invitation(match), ...(match.invite || match.alone ? [] : [element("p", LOCAL, "facts")])];
 }
 
 // The big button, or what this page waits for.
