@@ -15,7 +15,8 @@ from helpers.modules import modules
 
 import marl_airhockey as ah
 from marl_airhockey.build import build_world
-from marl_airhockey.code_export import export_code
+from marl_airhockey.code_export import export_code, exported
+from marl_airhockey.registry import scenario_names
 from marl_airhockey.sim.jit import targets
 from marl_airhockey.sim.world.layout import layout_of
 from marl_airhockey.toolkit import ServingScenario
@@ -153,6 +154,31 @@ def test_webassembly_computes_the_bits_of_python(
     assert run(path, given, tmp_path) == found
     given[10, 0, 0, 0] += 1e-9
     assert run(path, given, tmp_path)[0] != found[0]
+
+
+@pytest.fixture(scope="module")
+def all_games(tmp_path_factory):
+    """Folder with one module for all scenarios, and the paths of descriptions."""
+    pytest.importorskip("ziglang")
+    folder, names = tmp_path_factory.mktemp("all"), scenario_names()
+    code, games = exported(names, "wasm32", {"max_cycles": 2000})
+    (folder / "all.wasm").write_bytes(code)
+    for name, game in games.items():
+        (folder / f"{name}.bin").write_bytes(game.image)
+        files = {"code": "all.wasm", "image": f"{name}.bin"}
+        (folder / f"{name}.json").write_text(json.dumps({**files, **game.facts}))
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(NODE is None, reason="there is no Node")
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_scenario_has_the_bits_of_python_in_one_module(name, all_games, tmp_path):
+    path = all_games / f"{name}.json"
+    world = build_world(name, 1, False, {"max_cycles": 2000})
+    world.reset(seed=0)
+    found, given = played(world, 2000, json.loads(path.read_text())["shown"])
+    assert run(path, given, tmp_path) == found
 
 
 def header(facts):

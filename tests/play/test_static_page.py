@@ -1,5 +1,7 @@
 """The page without a server: the same games in the browser as in Python."""
 
+import base64
+import hashlib
 import json
 import shutil
 import subprocess
@@ -15,8 +17,9 @@ import numpy as np
 import pytest
 from helpers.modules import modules
 
+from marl_airhockey.build import build_world
 from marl_airhockey.data.reader import read_recording
-from marl_airhockey.data.saved_games import import_games
+from marl_airhockey.data.saved_games import FORMAT, import_games
 from marl_airhockey.play.live_match import LiveMatch
 from marl_airhockey.play.static_page import write_static_page
 from marl_airhockey.policies.load import ZOO
@@ -202,6 +205,49 @@ def test_a_game_in_the_browser_has_the_hash_of_python(page, browser, tmp_path):
         tab.wait_for_selector("#start .ladder")
     assert errors == []
     assert all(url.startswith((address, "blob:")) for url in requests)
+
+
+def games_of_policies(path, seeds):
+    """Write saved games of two policies; return the number of steps."""
+    actions, rows, numbers = [], [], []
+    drivers = {"paddle_0": "zoo/duel", "paddle_1": "zoo/duel_3"}
+    keywords = {"control_dt": 1 / 60}
+    world = build_world("duel", 1, False, keywords)
+    driven = build_world("duel", 1, False, {**keywords, "drivers": drivers})
+    for seed in range(seeds):
+        driven.reset(seed=seed)
+        world.reset(seed=seed)
+        over = False
+        count = len(actions)
+        while not over:
+            result = driven.step(np.zeros((1, 0, 2)))
+            actions.append(driven.action.astype(np.float32))
+            world.step(actions[-1].astype(float))
+            state = world.state
+            parts = state.position, state.velocity, state.angle, state.spin
+            numbers += [*(part + 0.0 for part in parts), world.outcome["reward"] + 0.0]
+            over = bool(result.terminated[0] | result.truncated[0])
+        steps = len(actions) - count
+        rows.append({"seed": seed, "steps": steps, "reason": "played to the end"})
+    players = [{"driver": name, "handicap": {}, "person": None} for name in drivers]
+    coded = base64.b64encode(np.array(actions).tobytes()).decode()
+    head = {"format": FORMAT, "scenario": "duel", "control_dt": 1 / 60}
+    line = json.dumps({**head, "players": players, "episodes": rows, "actions": coded})
+    data = b"".join([line.encode(), *(n.tobytes() for n in numbers)])
+    path.write_text(f"{line}\n{hashlib.sha256(data).hexdigest()}\n")
+    return len(actions)
+
+
+@pytest.mark.slow
+def test_games_of_policies_in_python_have_the_same_hash_in_the_browser(
+    page, browser, tmp_path
+):
+    path = tmp_path / "games.airhockey"
+    assert games_of_policies(path, 4) > 10_000
+    with served(page) as address:
+        tab = opened(browser, address, [], [])
+        tab.set_input_files("input[type=file]", path)
+        assert "same hash" in message(tab)
 
 
 @pytest.mark.slow

@@ -103,11 +103,11 @@ def test_thousands_of_operations():
 
     def function(s):
         x, y = s["positive"], s["halves"]
-        for k in range(1000):
+        for k in range(300):
             x, y = np.where(x > y, x - 0.25 * y, x), np.minimum(y + x / (k + 1), 2.0)
         return ({"x": x, "y": y},)
 
-    assert same(function)._loop._source.count("\n") > 10_000
+    assert same(function)._loop._source.count("\n") > 3_000
 
 
 def test_what_has_no_rule_is_named():
