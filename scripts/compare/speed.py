@@ -26,6 +26,7 @@ from rich.table import Table
 CASES = (
     *("juggle dict", "duel dict", "juggle 4096", "duel 4096"),
     *("duel chase", "doubles chase", "free_for_all chase"),
+    *("hit_goal dict ur5e", "hit_goal 4096 ur5e"),
 )
 MEASURE = """
 import sys, time
@@ -33,9 +34,10 @@ import numpy as np
 import marl_airhockey as ah
 
 backend = "batched" if "batched" in ah.backend_names() else "numba"
-scenario, kind = sys.argv[1:]
+scenario, kind, *profile = sys.argv[1:]
+given = {"backend": backend, **({"profile": profile[0]} if profile else {})}
 if kind == "dict":
-    env = ah.parallel_env(scenario, backend=backend)
+    env = ah.parallel_env(scenario, **given)
     draws = np.random.default_rng(0).uniform(-1, 1, (512, 2)).astype(np.float32)
     env.reset(seed=0)
     def play():
@@ -45,7 +47,7 @@ if kind == "dict":
                 env.reset()
         return 512
 elif kind == "chase":
-    world = ah.make_world(scenario, 256, backend=backend)
+    world = ah.make_world(scenario, 256, **given)
     table = world.scene.table
     turns = np.array([table.rotation(seat.side) for seat in world.scene.seats])
     world.reset(0)
@@ -56,7 +58,7 @@ elif kind == "chase":
             world.step(np.clip(chase, -1.0, 1.0))
         return 4 * 256
 else:
-    world = ah.make_world(scenario, int(kind), backend=backend)
+    world = ah.make_world(scenario, int(kind), **given)
     shape = (8, int(kind), len(world.open), 2)
     draws = np.random.default_rng(0).uniform(-1, 1, shape)
     world.reset(0)
