@@ -9,6 +9,7 @@ export function show(headline, detail = "", buttons = [], bare = false) {
   $("notice").hidden = false;
   $("notice").classList.toggle("bare", bare);
   put($("headline"), headline); put($("detail"), detail);
+  $("headline").classList.toggle("words", Number.isNaN(Number(headline)));
   const key = JSON.stringify(buttons.map(([text]) => text));
   if (key !== shown) {
     shown = key;

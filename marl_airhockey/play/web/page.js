@@ -20,6 +20,7 @@ import { View } from "./view.js";
 
 const LATE = 20; // ms by which others are drawn late, so that there is a frame after it
 const WIDE = 900; // CSS px of width from which a panel has a place beside the table
+const SHORT = 12; // characters of a score that fits on a small table
 const SMALL = 600; // CSS px of width or height below which play has no margins
 
 const view = new View($("table"));
@@ -86,7 +87,8 @@ function drawMatch(at, dt) {
 function drawScore() {
   if (!document.body.classList.contains("playing") || game.now.phase === "countdown" || Math.min(innerWidth, innerHeight) >= SMALL) return;
   const { pen } = view, [x, y] = view.middle, text = game.now.caption.split(",")[0].replace(/^goals |^lives /, "");
-  pen.font = `700 ${Math.round((text.length > 12 ? 0.05 : 0.12) * view.scale)}px system-ui, sans-serif`;
+  if (text.length > SHORT) return;
+  pen.font = `700 ${Math.round(0.12 * view.scale)}px system-ui, sans-serif`;
   pen.textAlign = "center"; pen.textBaseline = "middle";
   pen.fillStyle = alpha(inks.ink, 0.16); pen.fillText(text, x, y);
   pen.textBaseline = "alphabetic";
