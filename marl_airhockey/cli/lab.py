@@ -43,6 +43,13 @@ def open_lab(
             help="Physics engine of the emulated table: numba, pymunk or robosuite."
         ),
     ] = LabSetup.plant,
+    marked: Annotated[
+        bool,
+        typer.Option(
+            "--marked",
+            help="Use a puck with a bar on it, by which the camera sees its spin.",
+        ),
+    ] = False,
     demo: Annotated[
         bool,
         typer.Option(
@@ -69,7 +76,7 @@ def open_lab(
         running.close()
         raise RuntimeError("lab: another lab is already running; stop it first")
     with waiting("opening the lab (the first time takes longer)"):
-        opened = Lab(LabSetup(plant=plant), seed, frame_rate)
+        opened = Lab(LabSetup(plant=plant, marked=marked), seed, frame_rate)
     # Ctrl+C can come as soon as the RPC server is open, so all of it is covered.
     with contextlib.suppress(KeyboardInterrupt), opened, served(opened):
         if demo:

@@ -74,6 +74,9 @@ class Rig:
     """Settings of the control loops in the controller, and the usual lag of the arm."""
     operator: str = "person"
     """Operator who puts the puck on the table, "person" or "lab:PORT"."""
+    puck_marked: bool = False
+    """True for a puck with a mark, by which the camera sees its spin, see
+    `vision.mark`."""
     paddle: Colour | None = None
     """Colour of the paddle's top, for its detection in videos; None if unknown."""
     made: str = ""

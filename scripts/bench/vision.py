@@ -9,12 +9,17 @@ arm. For each method of calibrating the camera the script prints
 * the position error of the puck, where at least half of it is visible,
 * the error of the filter's velocity at the time of each image,
 * the CPU time of finding the puck in an image.
+
+With --marked the puck has a bar. The script then also prints the error of its
+orientation, and the error of the filter's spin. --out writes the figures as JSON.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import time
+from pathlib import Path
 from typing import NamedTuple
 
 import cv2
@@ -60,6 +65,10 @@ class Shot(NamedTuple):
     """Velocity of the puck, m/s, (2,)."""
     picture: Array
     """Image, (H, W, 3)."""
+    angle: float
+    """Orientation of the puck, rad."""
+    spin: float
+    """Angular velocity of the puck, rad/s."""
 
 
 class Sweep:
@@ -107,7 +116,8 @@ def film(setup: LabSetup, seconds: float, rate: float) -> list[Shot]:
     """
     edge = -float(setup.geometry.offsets[0])
     base = np.array([edge - BEHIND, 0.0])
-    camera = TableCamera(setup.geometry, lab_view(setup.geometry), base)
+    view = lab_view(setup.geometry)
+    camera = TableCamera(setup.geometry, view, base, marked=setup.marked)
     world, sweep = LabWorld(setup), Sweep(setup)
     rng, every = np.random.default_rng(1), round(RATE / rate)
     shots = []
@@ -119,9 +129,10 @@ def film(setup: LabSetup, seconds: float, rate: float) -> list[Shot]:
         paddle, moving = sweep.at(now)
         world.step(paddle, moving, 0.0)
         if k % every == 0:
-            seen = Seen(world.puck, world.puck_velocity, paddle, moving)
+            turn = world.puck_angle, world.puck_spin
+            seen = Seen(world.puck, world.puck_velocity, paddle, moving, *turn)
             picture = camera.photograph(seen, k)
-            shots.append(Shot(now, world.puck, world.puck_velocity, picture))
+            shots.append(Shot(now, world.puck, world.puck_velocity, picture, *turn))
     return shots
 
 
@@ -131,20 +142,25 @@ def measure(
     """Return the errors of one view on images."""
     table = setup.geometry
     length, width = (float(x) for x in table.size / 2)
-    detector = Detector(view, colour, table.puck_radius, (length, width))
+    half = length, width
+    detector = Detector(view, colour, table.puck_radius, half, marked=setup.marked)
     scene = LabWorld(setup).scene
     tracker = Tracker(scene, Physics(scene.defaults, "ur5e"))
     sweep, state = Sweep(setup), scene.still_state(1)
     spent, found, last = 0.0, 0, 0.0
     place_off: list[float] = []
     velocity_off: list[float] = []
+    angle_off: list[float] = []
+    spins: list[tuple[float, float]] = []
     first: list[Sighting] = []
-    for now, puck, velocity, picture in shots:
+    for now, puck, velocity, picture, angle, spin in shots:
         began = time.process_time()
         sighting = detector.find(CameraFrame(picture, now, 0))
         spent += time.process_time() - began
         if sighting is not None:
             found += 1
+            off = sighting.angle - angle
+            angle_off.append(off - np.pi * np.round(off / np.pi))
             if sighting.share > 0.5:
                 place_off.append(float(np.linalg.norm(sighting.place - puck)))
         served = now // SERVE != last // SERVE
@@ -164,8 +180,15 @@ def measure(
             estimate = tracker.estimate
             assert estimate is not None
             velocity_off.append(float(np.linalg.norm(estimate[2:] - velocity)))
+            spins.append((spin, float(state.spin[0, 1])))
     place, speed = 1e3 * np.array(place_off), np.array(velocity_off)
+    turned, (true, guess) = np.array(angle_off), np.array(spins).T
+    spun = float(np.mean((guess - true) ** 2))
     return {
+        "read": float(np.isfinite(turned).mean()),
+        "angle": float(np.sqrt(np.nanmean(turned**2))) if setup.marked else np.nan,
+        "spin_rmse": spun**0.5,
+        "spin_r2": 1.0 - spun / float(true.var()),
         "found": found / len(shots),
         "mean": float(place.mean()),
         "p95": float(np.percentile(place, 95)),
@@ -183,9 +206,11 @@ def main() -> None:
     parser.add_argument(
         "--rate", type=float, default=60.0, help="Number of images per second."
     )
+    parser.add_argument("--marked", action="store_true", help="Puck with a bar.")
+    parser.add_argument("--out", type=Path, help="JSON file to write.")
     given = parser.parse_args()
     cv2.setNumThreads(1)
-    setup = LabSetup()
+    setup = LabSetup(marked=given.marked)
     shots = film(setup, given.seconds, given.rate)
     edge = -float(setup.geometry.offsets[0])
     camera = TableCamera(
@@ -195,13 +220,20 @@ def main() -> None:
     x, y = lab_view(setup.geometry).project(np.array([[0.3, 0.0, 0.003]]))[0]
     colour = Colour.around(camera.photograph(there), (float(x), float(y)))
     print(f"{len(shots)} images, {given.rate:.0f} per second")
+    found = {}
     for name, view in calibrations(camera, setup).items():
-        m = measure(view, setup, shots, colour)
+        m = found[name] = measure(view, setup, shots, colour)
         print(
             f"{name:30} found {m['found']:.1%}; position {m['mean']:.2f} mm mean, "
             f"{m['p95']:.2f} p95, {m['most']:.1f} at most; velocity {m['rmse']:.3f} "
-            f"m/s RMSE, {m['median']:.3f} median; {m['cpu']:.2f} CPU-ms per image"
+            f"m/s RMSE, {m['median']:.3f} median; {m['cpu']:.2f} CPU-ms per image; "
+            f"spin {m['spin_rmse']:.2f} rad/s RMSE, R2 {m['spin_r2']:.2f}"
         )
+        if given.marked:
+            print(f"  mark read {m['read']:.1%}, orientation {m['angle']:.3f} rad RMS")
+    if given.out:
+        rows = {k: {n: round(x, 4) for n, x in m.items()} for k, m in found.items()}
+        given.out.write_text(json.dumps(rows, indent=1) + "\n")
 
 
 if __name__ == "__main__":

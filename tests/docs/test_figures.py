@@ -413,3 +413,14 @@ def test_figures_of_the_page_without_a_server_are_those_of_its_row():
         f"{row['ticks_per_s']:.1f}",
         f"{100 * row['core_share']:.0f} %",
     ]
+
+
+def test_figures_of_marked_pucks_are_those_of_their_rows():
+    shown = table("docs/robot_results.md", "puck", "bar read")
+    for line, name in zip(shown, ("vision_marked", "vision_plain"), strict=True):
+        row = json.loads((DATA / f"{name}.json").read_text())["tags of measured places"]
+        assert line["spin error, RMS"] == f"{row['spin_rmse']:.2f} rad/s"
+        assert line["mean error of the position"] == f"{row['mean']:.2f} mm"
+        if name == "vision_marked":
+            assert line["bar read"] == f"{100 * row['read']:.1f} %"
+            assert line["orientation error, RMS"] == f"{row['angle']:.3f} rad"

@@ -23,6 +23,7 @@ from marl_airhockey.hardware.vision.calibration import (
     view_from_tags,
     view_trouble,
 )
+from marl_airhockey.hardware.vision.mark import NOISE
 from marl_airhockey.sim.core.table import TABLES
 
 TABLE = TABLES["full_size"]
@@ -84,6 +85,62 @@ def test_a_puck_half_under_the_arm_is_completed(camera, detector):
             errors.append(np.linalg.norm(seen.place - place))
     assert errors
     assert np.max(errors) < 0.005
+
+
+@pytest.fixture(scope="module")
+def marked_camera():
+    return TableCamera(TABLE, VIEW, np.array([-1.185, 0.0]), seed=3, marked=True)
+
+
+def turned(off):
+    """Difference of two orientations of a bar, rad."""
+    return off - np.pi * np.round(np.asarray(off) / np.pi)
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.0, 2.0])
+def test_the_orientation_of_a_marked_puck_is_read(marked_camera, detector, speed):
+    rng, off, errors = np.random.default_rng(0), [], []
+    finder = replace(detector, marked=True)
+    for k in range(80):
+        place = rng.uniform([-0.3, -0.38], [0.92, 0.38])
+        heading, angle = rng.uniform(-np.pi, np.pi, 2)
+        velocity = speed * np.array([np.cos(heading), np.sin(heading)])
+        turn = angle, rng.normal(0.0, 15.0)
+        image = marked_camera.photograph(Seen(place, velocity, HOME, STILL, *turn), k)
+        seen = finder.find(CameraFrame(image, 1.0, k))
+        off.append(turned(seen.angle - angle))
+        errors.append(np.linalg.norm(seen.place - place))
+    assert np.sqrt(np.mean(np.square(off))) < 1.3 * NOISE
+    assert np.mean(errors) < 0.0006
+
+
+def test_a_puck_without_a_mark_or_under_the_arm_has_no_orientation(
+    camera, marked_camera, detector
+):
+    finder = replace(detector, marked=True)
+    plain = camera.photograph(Seen(np.array([0.4, 0.1]), STILL, HOME, STILL))
+    assert np.isnan(finder.find(CameraFrame(plain, 0.0, 0)).angle)
+    hidden = 0
+    for y in np.linspace(0.04, 0.085, 9):
+        place = HOME + np.array([-0.12, y])
+        image = marked_camera.photograph(Seen(place, STILL, HOME, STILL, 0.5))
+        seen = finder.find(CameraFrame(image, 0.0, 0))
+        if seen is not None and seen.share < 0.85:
+            hidden += 1
+            assert np.isnan(seen.angle)
+    assert hidden
+
+
+def test_the_colour_of_a_marked_puck_is_that_around_the_mark(marked_camera):
+    place = np.array([0.3, 0.0])
+    image = marked_camera.photograph(Seen(place, STILL, HOME, STILL, 0.7))
+    x, y = VIEW.project(np.array([[*place, 0.003]]))[0]
+    colour = Colour.around(image, (x, y))
+    half = tuple(TABLE.size / 2)
+    finder = Detector(VIEW, colour, TABLE.puck_radius, half, marked=True)
+    seen = finder.find(CameraFrame(image, 0.0, 0))
+    assert np.linalg.norm(seen.place - place) < 0.001
+    assert abs(turned(seen.angle - 0.7)) < 0.1
 
 
 def test_no_puck_is_no_puck(camera, detector):

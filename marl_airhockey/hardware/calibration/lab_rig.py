@@ -76,6 +76,7 @@ def calibrate_lab(client: LabClient) -> Rig:
         camera=source,
         view=view,
         puck=Colour.around(frames[-1].image, (float(x), float(y))),
+        puck_marked=info["marked"],
         paddle=Colour.around(frames[-1].image, (float(u), float(v)), REACH),
         robot=info["host"],
         mounting=fit_mounting(*(np.array(x) for x in touched)),

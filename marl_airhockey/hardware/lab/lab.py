@@ -132,6 +132,7 @@ class Lab:
             "host": self.host,
             "camera": self.camera_port,
             "table": self.setup.table,
+            "marked": self.setup.marked,
             "pids": [process.pid for process in self._processes],
         }
 

@@ -37,6 +37,8 @@ class LabSetup:
     """Tilt of the table, deg."""
     plant: str = "numba"
     """Name of the backend that moves puck and paddle."""
+    marked: bool = False
+    """True for a puck with a mark, see `vision.mark`."""
     latency: float = 0.028
     """Time from the middle of an exposure until the frame is sent, s: half of the
     exposure, the readout and the transfer."""

@@ -18,10 +18,11 @@ from marl_airhockey.hardware.lab.camera import (
 )
 from marl_airhockey.hardware.lab.drawing import draw_polygon, fill, paste_tag, shade
 from marl_airhockey.hardware.vision.lens import CameraView, Lens
+from marl_airhockey.hardware.vision.mark import LENGTH, WIDTH
 from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
-PUCK, ARM = (42, 40, 205), (96, 92, 90)
+PUCK, ARM, MARK = (42, 40, 205), (96, 92, 90), (25, 25, 25)
 """Colours: blue, green, red."""
 TAGS_BESIDE = 0.075
 """Distance of the tags' centres from the table's edge, m."""
@@ -64,6 +65,10 @@ class Seen:
     """Position (2,) of the paddle, m."""
     paddle_velocity: Array
     """Velocity (2,) of the paddle, m/s."""
+    puck_angle: float = 0.0
+    """Orientation of the puck, rad."""
+    puck_spin: float = 0.0
+    """Angular velocity of the puck, rad/s."""
 
 
 class TableCamera(LabCamera[Seen]):
@@ -75,6 +80,7 @@ class TableCamera(LabCamera[Seen]):
         base: Position (2,) of the arm's base, table frame, m.
         exposure: Exposure time, s.
         seed: Seed of the image noise.
+        marked: True for a puck with a mark, see `vision.mark`.
     """
 
     def __init__(
@@ -84,7 +90,9 @@ class TableCamera(LabCamera[Seen]):
         base: Array,
         exposure: float = 1 / 120,
         seed: int = 0,
+        marked: bool = False,
     ) -> None:
+        self._marked = marked
         self._table, self._base = table, np.asarray(base)
         self.left: Array | None = None
         """Position (2,) of a second puck at rest, m; None without one."""
@@ -110,6 +118,9 @@ class TableCamera(LabCamera[Seen]):
             if puck is not None:
                 shade(part, view, puck + SHADOW + radius * CIRCLE, corner)
                 fill(part, view, puck + radius * CIRCLE, PUCK_HEIGHT, PUCK, corner)
+        if moved is not None and self._marked:
+            bar = moved + _bar(radius, seen.puck_angle + later * seen.puck_spin)
+            fill(part, view, bar, PUCK_HEIGHT, MARK, corner)
         size = self._table.paddle_radius
         shade(part, view, paddle + 4 * SHADOW + size * CIRCLE, corner)
         fill(part, view, paddle + size * CIRCLE, PADDLE_TOP, PADDLE, corner)
@@ -132,6 +143,14 @@ class TableCamera(LabCamera[Seen]):
     def _speed(self, seen: Seen) -> float:
         both = seen.puck_velocity, seen.paddle_velocity
         return max(float(np.linalg.norm(velocity)) for velocity in both)
+
+
+def _bar(radius: float, angle: float) -> Array:
+    """Return the corners (4, 2) of the mark on a puck, from its centre, m."""
+    x, y = radius * LENGTH / 2, radius * WIDTH / 2
+    c, s = np.cos(angle), np.sin(angle)
+    corners = np.array([(x, y), (-x, y), (-x, -y), (x, -y)])
+    return np.asarray(corners @ np.array([[c, s], [-s, c]]))
 
 
 def _link(paddle: Array, base: Array) -> Array:

@@ -53,7 +53,9 @@ class TableLoop:
         edge = -float(setup.geometry.offsets[0])
         base = np.array([edge - BEHIND, 0.0])
         self._view = lab_view(setup.geometry)
-        self._camera = TableCamera(setup.geometry, self._view, base, seed=seed)
+        self._camera = TableCamera(
+            setup.geometry, self._view, base, seed=seed, marked=setup.marked
+        )
         self._every = max(round(RATE / frame_rate), 1)
         self._steps, self._frames, self._frozen = 0, 0, False
         self._repeats = self._stuck = False
@@ -124,7 +126,8 @@ class TableLoop:
         world = self.world
         moving = np.zeros(2) if world.held else world.puck_velocity
         puck = world.puck if world.present else None
-        seen = Seen(puck, moving, paddle, velocity)
+        rotation = world.puck_angle, 0.0 if world.held else world.puck_spin
+        seen = Seen(puck, moving, paddle, velocity, *rotation)
         self._frames += 1
         again = self._stuck or (self._repeats and self._frames % 2)
         if not (again and self._image.size):

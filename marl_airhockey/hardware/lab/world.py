@@ -73,6 +73,16 @@ class LabWorld:
         """Velocity (2,) of the puck, table frame, m/s."""
         return np.asarray(self._state.puck_velocity[0, 0].copy())
 
+    @property
+    def puck_angle(self) -> float:
+        """Orientation of the puck, rad."""
+        return float(self._state.angle[0, self.scene.bodies.puck][0])
+
+    @property
+    def puck_spin(self) -> float:
+        """Angular velocity of the puck, rad/s."""
+        return float(self._state.spin[0, self.scene.bodies.puck][0])
+
     def put(self, place: Array, velocity: Array, held: bool) -> None:
         """Put the puck on the table.
 

@@ -47,6 +47,7 @@ class TableDevices:
         detector = Detector(
             *(rig.view, rig.puck, table.puck_radius, half),  # type: ignore[arg-type]
             readout=rig.readout,
+            marked=rig.puck_marked,
         )
         self.overlay = Overlay(rig.view, table)
         self.rectifier = Rectifier(rig.view, table.size)
@@ -81,6 +82,13 @@ class TableDevices:
             raise RuntimeError(
                 f"camera: {len(found)} objects have the puck's colour and size, at "
                 f"{found} m; leave one puck on the table, or calibrate another colour"
+            )
+        seen = detector.find(frame)
+        if detector.marked and seen is not None and np.isnan(seen.angle):
+            raise RuntimeError(
+                f"camera: the puck at {np.round(seen.place, 2).tolist()} m shows no "
+                "mark, but puck_marked is true in the rig; use the marked puck, renew "
+                "its bar, or set puck_marked to false"
             )
 
     def close(self) -> None:

@@ -9,18 +9,27 @@ import numpy as np
 from marl_airhockey.hardware.table.events import MeasuredPuck, find_contacts
 from marl_airhockey.hardware.table.innovations import Innovations
 from marl_airhockey.hardware.vision import Sighting
+from marl_airhockey.hardware.vision.mark import NOISE
 from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.sensing.estimator import Estimator
+from marl_airhockey.sim.sensing.frame import Newest
+from marl_airhockey.sim.sensing.puck_mark import MarkReadings, wrapped
 from marl_airhockey.types import Array
 
 SPACING, PAST = 0.01, 40
 """Time between two samples of the paddle's path, s, and number of past samples."""
+APART = 0.045
+"""Longest time between two sightings that measure a spin, s. In a period of a camera
+with 30 frames/s, a puck with up to 47 rad/s turns by less than a quarter, so that its
+mark is not ambiguous."""
 SMOOTHED = 0.05
 """Weight of the newest sighting in the mean distance from the estimate."""
 WORLD = np.zeros(1, np.int64)
 """Index of the one world."""
+UNREAD = MarkReadings.unread(1, 1)
+"""Readings of a puck without a visible mark."""
 
 
 class Tracker:
@@ -35,6 +44,8 @@ class Tracker:
         self._scene = scene
         self._estimator = Estimator(scene, 1, physics, SPACING)
         self._touching = False
+        self._last_angle: tuple[float, float] = (-np.inf, np.nan)
+        """Time, s, and orientation, rad, of the last sighting."""
         self.last: MeasuredPuck | None = None
         """Newest sighting, filtered; None before an episode begins."""
         self.noise = 0.0
@@ -53,6 +64,7 @@ class Tracker:
     def forget(self) -> None:
         """Forget the puck until the next episode begins."""
         self.last, self._touching, self.noise = None, False, 0.0
+        self._last_angle = -np.inf, np.nan
         self.innovations.restart()
 
     def begin(self, seen: list[Sighting]) -> None:
@@ -93,7 +105,7 @@ class Tracker:
             self._follow(state, sighting, track, now, since)
         self._update(np.zeros(2), 0.0, False, track, now)
         seats = self._scene.bodies.paddles
-        x, y, vx, vy, edge = self._estimator.now[0, 0]
+        x, y, vx, vy, edge = self._estimator.now[0, 0, :5]
         state.position[0, seats] = x, y
         state.velocity[0, seats] = vx, vy
         state.spin[0, seats] = edge / self._scene.table.puck_radius
@@ -116,7 +128,8 @@ class Tracker:
             off = sighting.place - self._estimator.now[0, 0, :2]
             self.innovations.add(off, taken - last.time)
         # The filtered position at the time of the frame itself.
-        self._update(sighting.place, taken, True, track, taken)
+        readings = self._readings(sighting)
+        self._update(sighting.place, taken, True, track, taken, readings)
         found = self._estimator.now[0, 0]
         new = self.last = MeasuredPuck(taken, found[:2].copy(), found[2:4].copy())
         apart = float(np.linalg.norm(new.place - sighting.place))
@@ -136,16 +149,36 @@ class Tracker:
                 state.crossed[0, 0, k] = True
                 state.crossed_velocity[0, 0, k] = met.velocity
 
+    def _readings(self, sighting: Sighting) -> MarkReadings:
+        """Return orientation and spin of the puck, by this sighting and the last."""
+        before, self._last_angle = self._last_angle, (sighting.taken, sighting.angle)
+        since, readings = sighting.taken - before[0], MarkReadings.unread(1, 1)
+        change = sighting.angle - before[1]
+        if np.isfinite(change) and since < APART:
+            readings.angle[:], readings.spin[:] = (
+                sighting.angle,
+                wrapped(change) / since,
+            )
+            readings.noise[:], readings.span[:], readings.read[:] = NOISE, since, True
+        return readings
+
     def _update(
-        self, position: Array, taken: float, fresh: bool, track: Array, now: float
+        self,
+        position: Array,
+        taken: float,
+        fresh: bool,
+        track: Array,
+        now: float,
+        readings: MarkReadings = UNREAD,
     ) -> None:
         at = now - SPACING * np.arange(PAST, -1, -1)
         path = np.stack([np.interp(at, track[:, 0], track[:, k]) for k in (1, 2)], -1)
         self._estimator.update(
             WORLD,
-            position.reshape(1, 1, 2),
-            np.full(1, taken),
-            np.full((1, 1), fresh),
+            Newest(
+                position.reshape(1, 1, 2), np.full(1, taken), np.full((1, 1), fresh)
+            ),
+            readings,
             path.reshape(1, -1, 1, 2),
             np.full(1, now),
         )

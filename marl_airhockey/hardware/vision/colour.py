@@ -13,6 +13,9 @@ from marl_airhockey.types import Array
 
 HUES = 180
 """Number of hues of OpenCV in 8 bits."""
+PALE, DARK = 60, 0.8
+"""Least saturation of a coloured pixel, 0 .. 255, and least brightness, as a share of
+the median of its surroundings."""
 FAINT = 0.2
 """Share of the largest amount of a colour below which a pixel does not count."""
 
@@ -62,13 +65,17 @@ class Colour:
         axis -= axis.mean()
         return np.asarray(axis / np.linalg.norm(axis))
 
+    def amount(self, image: Array) -> Array:
+        """Return the amount of the colour (H, W) float32 of each pixel of an image."""
+        return np.asarray(image.astype(np.float32) @ self._axis, np.float32)
+
     def middle(self, image: Array) -> Array:
         """Return the centre (2,), px, of an object of this colour in a small image.
 
         Each pixel is weighted by its amount of the colour, which is linear in light.
         So a shadow next to the object does not shift the centre, as it does in a mask.
         """
-        amount = image.astype(np.float32) @ self._axis
+        amount = self.amount(image)
         weights = np.maximum(amount - FAINT * amount.max(), 0.0)
         total = float(weights.sum()) or 1.0
         across, down = weights.sum(0), weights.sum(1)
@@ -78,7 +85,7 @@ class Colour:
 
     @staticmethod
     def around(image: Array, pixel: tuple[float, float], radius: int = 4) -> Colour:
-        """Return the range of the colours around a pixel of a uniform object.
+        """Return the range of the colours around a pixel of an object.
 
         Args:
             image: Image (H, W, 3) uint8, blue, green, red.
@@ -94,14 +101,19 @@ class Colour:
         if not part.size:
             raise ValueError(f"pixel {pixel}: outside of the image")
         hsv = cv2.cvtColor(part, cv2.COLOR_BGR2HSV).reshape(-1, 3).astype(float)
+        # A mark on a puck may cover less than half of the square.
+        bright = hsv[:, 2] >= DARK * np.median(hsv[:, 2])
+        coloured = bright & (hsv[:, 1] >= PALE)
+        if coloured.mean() < 0.5:
+            raise ValueError(
+                f"pixel {pixel}: the object has no colour (saturation "
+                f"{np.median(hsv[:, 1]):.0f} of 255); click the puck, or make it "
+                "colourful"
+            )
+        hsv = hsv[coloured]
         angles = hsv[:, 0] * (2 * np.pi / HUES)
         mean = np.angle(np.exp(1j * angles).mean()) * HUES / (2 * np.pi) % HUES
         saturation, brightness = np.percentile(hsv[:, 1:], 5, axis=0)
-        if saturation < 60:
-            raise ValueError(
-                f"pixel {pixel}: the object has no colour (saturation "
-                f"{saturation:.0f} of 255); click the puck, or make it colourful"
-            )
         off = np.abs((hsv[:, 0] - mean + HUES / 2) % HUES - HUES / 2)
         width = max(float(np.percentile(off, 95)) + 4.0, 6.0)
         least = (max(int(0.6 * saturation), 40), max(int(0.6 * brightness), 30))

@@ -13,12 +13,15 @@ import numpy as np
 from marl_airhockey.hardware.camera.camera import CameraFrame
 from marl_airhockey.hardware.vision.colour import Colour
 from marl_airhockey.hardware.vision.lens import CameraView
+from marl_airhockey.hardware.vision.mark import orientation_of
 from marl_airhockey.types import Array
 
 LEAST, MOST = 0.35, 1.8
 """Range of an area that may be a puck, as shares of a whole puck's area."""
 WHOLE = 0.93
 """Share above which a puck counts as not hidden."""
+OPEN = 0.85
+"""Share above which nothing hides the circles on which a mark is read."""
 RIM = 2
 """Margin around an area of the colour, px, in which there may be more of it."""
 ROUND = 0.12
@@ -36,6 +39,8 @@ class Sighting(NamedTuple):
     """Visible share of the disc."""
     pixel: Array
     """Centre (2,) of the disc, px."""
+    angle: float = float("nan")
+    """Orientation of its mark, rad, modulo pi; nan if no mark was read."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,8 @@ class Detector:
     readout: float = 0.0
     """Time between the exposures of the first and the last row, s, for a camera with a
     rolling shutter."""
+    marked: bool = False
+    """True for a puck with a mark, see `vision.mark`."""
 
     def find(self, frame: CameraFrame) -> Sighting | None:
         """Return the largest disc of the colour; None without one."""
@@ -82,7 +89,16 @@ class Detector:
             found = self._judge(image, labels, stats[k], middles[k], int(k))
             if found is not None:
                 position, pixel, share = found
-                yield Sighting(position, self._time(frame, pixel), share, pixel)
+                taken = self._time(frame, pixel)
+                angle = self._angle(frame.image, position, share)
+                yield Sighting(position, taken, share, pixel, angle)
+
+    def _angle(self, image: Array, position: Array, share: float) -> float:
+        """Return the orientation of the mark; nan without one, or if it is hidden."""
+        if not self.marked or share < OPEN:
+            return float("nan")
+        parts = self.view, self.colour, position, self.radius, self.height
+        return orientation_of(image, *parts)
 
     def _time(self, frame: CameraFrame, pixel: Array) -> float:
         rows = frame.image.shape[0]
@@ -111,10 +127,14 @@ class Detector:
         if (np.abs(position) > np.asarray(self.extent) + self.radius).any():
             return None
         whole = np.pi * (self.radius * self.view.scale(position, self.height)) ** 2
-        share = float(box[cv2.CC_STAT_AREA]) / whole
+        x, y, width, height = box[:4]
+        area, part = float(box[cv2.CC_STAT_AREA]), None
+        if self.marked:
+            part = (labels[y : y + height, x : x + width] == label).astype(np.uint8)
+            area = float(_filled(part).sum())
+        share = area / whole
         if not LEAST < share < MOST:
             return None
-        x, y, width, height = box[:4]
         if share > WHOLE:
             rim = np.array([x, y]) - RIM
             low = np.maximum(rim, 0)
@@ -122,7 +142,8 @@ class Detector:
             patch = image[low[1] : high[1], low[0] : high[0]]
             pixel = self.colour.middle(patch) + low + corner
             return self.view.to_table(pixel, self.height)[0], pixel, min(share, 1.0)
-        part = (labels[y : y + height, x : x + width] == label).astype(np.uint8)
+        if part is None:
+            part = (labels[y : y + height, x : x + width] == label).astype(np.uint8)
         completed = self._complete(part, np.array([x, y]) + corner)
         if completed is None:
             return None
@@ -163,6 +184,12 @@ class Detector:
             step, *_ = np.linalg.lstsq(directions, sizes - inner, rcond=None)
             centre = centre + step
         return np.asarray(centre)
+
+
+def _filled(part: Array) -> Array:
+    """Return a mask (h, w) of 0 and 1 without holes, such as that of a mark."""
+    contours, _ = cv2.findContours(part, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return np.asarray(cv2.drawContours(part.copy(), contours, -1, 1, cv2.FILLED))
 
 
 def _centres(points: Array, radius: float) -> Array:

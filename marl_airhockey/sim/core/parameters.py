@@ -84,6 +84,12 @@ PARAMETERS: dict[str, Parameter] = {
     "false_detection": Parameter(
         0.0, 0.0, 0.5, "1", "share of frames in which a puck is detected elsewhere"
     ),
+    "angle_noise": Parameter(
+        0.0, 0.0, 1.0, "rad", "sd of the sensed orientation; 0 for pucks without a mark"
+    ),
+    "angle_dropout": Parameter(
+        0.0, 0.0, 0.9, "1", "share of frames in which the mark of a puck is not read"
+    ),
     "arm_stiffness": Parameter(
         400.0, 25.0, 1600.0, "1/s2", "stiffness of the position control", arms=True
     ),

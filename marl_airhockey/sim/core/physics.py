@@ -31,6 +31,7 @@ ranges by name. The key ``preset`` names the preset that they modify."""
 SIMULATED = (
     *("observation_delay", "observation_jitter", "position_noise"),
     *("calibration_error", "occlusion", "false_detection"),
+    *("angle_noise", "angle_dropout"),
     *("action_delay", "servo_time", *SCATTER),
 )
 """Names of the parameters that only a simulation needs. A real table has these effects

@@ -18,6 +18,17 @@ from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.table import GRAVITY
 from marl_airhockey.sim.jit.cache import compiled, inner
 from marl_airhockey.sim.jit.elementary import sin
+from marl_airhockey.sim.sensing.correction import (
+    correct_orientation,
+    correct_position,
+)
+from marl_airhockey.sim.sensing.frame import Newest
+from marl_airhockey.sim.sensing.puck_mark import (
+    BOUNCE_SPIN,
+    HIT_SPIN,
+    SPUN,
+    MarkReadings,
+)
 from marl_airhockey.types import Array
 
 STEP = 0.01
@@ -31,11 +42,6 @@ BOUNCE, HIT = 0.08, 0.10
 speed."""
 FIRST = 0.02
 """Standard deviation of the initial velocity, m/s."""
-ABRUPT = 2.5
-"""Velocity change above which a second frame must confirm it, m/s."""
-STRANGE = 9.0
-"""Squared error, in variances of the prediction, above which the filter assumes that an
-unmodelled event has changed the velocity."""
 
 PARAMETERS = (
     *("puck_damping", "puck_drag", "wall_restitution", "wall_restitution_slope"),
@@ -94,21 +100,22 @@ class Estimator:
             control_dt,
         )
         shape = worlds, bodies.pucks
-        self._mean, self._spread = np.zeros((*shape, 5)), np.zeros((*shape, 3))
-        """Estimates at the last frame (x, y, vx, vy, speed of the edge), and their
-        variance of the position, covariance and variance of the velocity, which are
-        equal for both axes."""
+        self._mean, self._spread = np.zeros((*shape, 6)), np.zeros((*shape, 6))
+        """Estimates at the last frame (x, y, vx, vy, speed of the edge, orientation).
+        Their variance of the position, covariance and variance of the velocity, which
+        are equal for both axes, and the same of orientation and spin."""
         self._taken, self._doubted = np.zeros(shape), np.zeros(shape, np.bool_)
-        self.now = np.zeros((*shape, 5))
-        """Estimates for now (B, pucks, 5): x and y, m; vx, vy and speed of the edge,
-        m/s."""
+        self.now = np.zeros((*shape, 6))
+        """Estimates for now (B, pucks, 6): x and y, m; vx, vy and speed of the edge,
+        m/s; orientation, rad, which is meaningful for pucks with a mark."""
 
     @property
     def tracks(self) -> tuple[Array, Array]:
         """Estimates at the last frame of each puck.
 
         The first array contains the times of the frames (B, pucks), s. The second one
-        contains x and y, m, and vx, vy and speed of the edge, m/s (B, pucks, 5).
+        contains x and y, m, and vx, vy and speed of the edge, m/s, and more
+        (B, pucks, 6).
         """
         return self._taken, self._mean
 
@@ -123,15 +130,15 @@ class Estimator:
         """
         self._mean[worlds] = 0.0
         self._mean[worlds, :, :2], self._mean[worlds, :, 2:4] = seen, velocity
-        self._spread[worlds] = self._known.noise, 0.0, FIRST**2
+        spun = (SPUN / self._known.radius) ** 2
+        self._spread[worlds] = self._known.noise, 0.0, FIRST**2, np.pi**2, 0.0, spun
         self._taken[worlds], self._doubted[worlds] = taken, False
 
     def update(
         self,
         worlds: Array,
-        seen: Array,
-        taken: Array,
-        fresh: Array,
+        newest: Newest,
+        readings: MarkReadings,
         paddles: Array,
         now: Array,
     ) -> None:
@@ -139,15 +146,14 @@ class Estimator:
 
         Args:
             worlds: Indices (W,) of the worlds.
-            seen: Sensed positions (W, n, 2) in the frame, pucks first, m.
-            taken: Times (W,) of the frame, s.
-            fresh: True for bodies that are visible in a new frame (W, n), pucks first.
+            newest: Frame, pucks first.
+            readings: Orientations and spins in the frame.
             paddles: Positions (B, steps, S, 2) of the paddles at the last control
                 steps, up to now, m.
             now: Current times (B,), s.
         """
         _update(
-            *(worlds, seen, taken, fresh, paddles, now, self._known),
+            *(worlds, newest, readings, paddles, now, self._known),
             *(self._mean, self._spread, self._taken, self._doubted),
             self.now,
         )
@@ -156,9 +162,8 @@ class Estimator:
 @compiled(nogil=True, error_model="numpy")
 def _update(
     worlds: Array,
-    seen: Array,
-    taken: Array,
-    fresh: Array,
+    newest: Newest,
+    readings: MarkReadings,
     paddles: Array,
     now: Array,
     known: Surroundings,
@@ -169,7 +174,7 @@ def _update(
     shown: Array,
 ) -> None:
     """Update the arrays of an `Estimator` in place, see `Estimator.update`."""
-    ahead, wide = np.empty(5), np.empty(3)
+    (seen, taken, fresh), ahead, wide = newest, np.empty(6), np.empty(6)
     for row in range(len(worlds)):
         w = worlds[row]
         for p in range(mean.shape[1]):
@@ -177,41 +182,17 @@ def _update(
                 ahead[:], wide[:] = mean[w, p], spread[w, p]
                 since = taken[row] - last[w, p]
                 _predict(ahead, wide, last[w, p], since, paddles[w], now[w], known)
-                doubted[w, p] = _correct(
+                doubted[w, p] = correct_position(
                     ahead, wide, seen[row, p], since, doubted[w, p], known.noise
                 )
+                if readings.read[row, p] and not doubted[w, p]:
+                    correct_orientation(ahead, wide, readings, row, p, known.radius)
                 if not doubted[w, p]:
                     mean[w, p], spread[w, p], last[w, p] = ahead, wide, taken[row]
             ahead[:], wide[:] = mean[w, p], spread[w, p]
             since = now[w] - last[w, p]
             _predict(ahead, wide, last[w, p], since, paddles[w], now[w], known)
             shown[w, p] = ahead
-
-
-@inner(error_model="numpy")
-def _correct(
-    mean: Array, spread: Array, seen: Array, since: float, doubted: bool, noise: float
-) -> bool:
-    """Correct a prediction by a sensed position; return True if it is doubtful."""
-    dx, dy = seen[0] - mean[0], seen[1] - mean[1]
-    off = dx * dx + dy * dy
-    if off > (ABRUPT * since) ** 2 and not doubted:
-        return True
-    if off > 2.0 * STRANGE * (spread[0] + noise):
-        # Assume that the velocity changed some time after the last frame.
-        change = off / (since * since)
-        spread[2] += change
-        spread[1] += change * since
-        spread[0] += off
-    gain_x, gain_v = spread[0] / (spread[0] + noise), spread[1] / (spread[0] + noise)
-    mean[0] += gain_x * dx
-    mean[1] += gain_x * dy
-    mean[2] += gain_v * dx
-    mean[3] += gain_v * dy
-    spread[2] -= gain_v * spread[1]
-    spread[1] -= gain_v * spread[0]
-    spread[0] -= gain_x * spread[0]
-    return False
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -227,8 +208,9 @@ def _predict(
     """Predict an estimate in place.
 
     Args:
-        mean: Estimate (5,): x and y, m; vx, vy and speed of the edge, m/s.
-        spread: Variance of the position, covariance and variance of the velocity (3,).
+        mean: Estimate (6,), see `Estimator.now`.
+        spread: Variance of the position, covariance and variance of the velocity, and
+            the same of orientation and spin (6,).
         begin: Time of the estimate, s.
         seconds: Duration of the prediction, s.
         paddles: Positions (n, S, 2) of the paddles at the last control steps, up to
@@ -247,6 +229,9 @@ def _predict(
         spread[0] += h * (2.0 * spread[1] + h * spread[2])
         spread[1] += h * spread[2]
         spread[2] += (DRIFT * h) ** 2
+        mean[5] += h * mean[4] / known.radius
+        spread[3] += h * (2.0 * spread[4] + h * spread[5])
+        spread[4] += h * spread[5]
         for side in range(len(known.offsets)):
             nx, ny = known.normals[side]
             beyond = known.offsets[side] + nx * mean[0] + ny * mean[1] - known.radius
@@ -258,6 +243,7 @@ def _predict(
                 mean[0] -= (1.0 + e) * beyond * nx
                 mean[1] -= (1.0 + e) * beyond * ny
                 spread[2] += (BOUNCE * closing) ** 2
+                spread[5] += (BOUNCE_SPIN * closing / known.radius) ** 2
         back = (now - begin - (k + 1) * h) / known.control_dt
         _meet(mean, spread, paddles, back, known)
 
@@ -289,6 +275,7 @@ def _meet(
                 mean, nx, ny, closing, along, known.parameters[7], known.parameters[8]
             )
             spread[2] += (HIT * closing) ** 2
+            spread[5] += (HIT_SPIN * closing / known.radius) ** 2
             back_out *= 1.0 + known.parameters[7]
         mean[0] += back_out * nx
         mean[1] += back_out * ny

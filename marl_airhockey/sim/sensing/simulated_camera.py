@@ -17,6 +17,7 @@ from marl_airhockey.sim.sensing.contacts import ContactSensor
 from marl_airhockey.sim.sensing.delay import depth
 from marl_airhockey.sim.sensing.estimator import Estimator
 from marl_airhockey.sim.sensing.occlusion import bases
+from marl_airhockey.sim.sensing.puck_mark import MarkReadings, PuckMarks
 from marl_airhockey.types import ALL, Array, Rows
 
 SENSED = (
@@ -35,7 +36,8 @@ class SimulatedCamera:
     the episode plus a jitter of the step. A position has white noise and a smooth error
     that is constant in an episode. A puck near an arm may be hidden. It keeps the
     position and velocity of the last frame in which it was visible. Rarely a puck is
-    detected at a wrong position. A velocity is the difference between the last two
+    detected at a wrong position. The filter also uses the orientation of a puck with a
+    mark. A velocity is the difference between the last two
     frames in which a body was visible, divided by the time between them. Paddles are
     not observed by the camera, because robots report them. Contacts of pucks with
     paddles are detected in the frames and have their latency.
@@ -78,6 +80,10 @@ class SimulatedCamera:
             extent=extent,
             control_dt=control_dt,
         )
+        self._marks = None
+        if estimates and PuckMarks.exist(physics):
+            steps = self._view.past.shape[1]
+            self._marks = PuckMarks(scene, b, steps, control_dt)
         estimator = Estimator(scene, b, physics, control_dt)
         self._estimator = estimator if estimates else None
         self._contacts = ContactSensor(scene, b, control_dt)
@@ -119,6 +125,8 @@ class SimulatedCamera:
             seen = view.seen[worlds, : self.pucks]
             taken = view.taken[worlds, : self.pucks]
             self._estimator.reset(worlds, seen[..., :2], seen[..., 2:], taken)
+        if self._marks is not None:
+            self._marks.reset(worlds, state)
         self._contacts.reset(worlds, *self._tracks)
 
     @property
@@ -200,7 +208,11 @@ class SimulatedCamera:
         true = state.position, state.velocity, now
         frame.take(worlds, units, *true, errors, view, newest)
         if self._estimator is not None:
-            self._estimator.update(worlds, *newest, view.paddles, now)
+            readings = MarkReadings.unread(w, self.pucks)
+            if self._marks is not None:
+                fresh = newest.taken, newest.fresh[:, : self.pucks]
+                readings = self._marks.look(worlds, state, *fresh, values, streams)
+            self._estimator.update(worlds, newest, readings, view.paddles, now)
         self._contacts.update(worlds, *self._tracks, view.paddles, now)
 
 

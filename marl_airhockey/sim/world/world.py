@@ -30,6 +30,7 @@ from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.rng import RandomStreams, StreamSet, seeds_of
 from marl_airhockey.sim.core.seat import ReachPlanes
 from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.sensing.puck_mark import STREAM, PuckMarks
 from marl_airhockey.sim.sensing.sensor import Needs, Sensor
 from marl_airhockey.sim.world.actions import Actions
 from marl_airhockey.sim.world.control_step import ControlStep, Moment
@@ -103,8 +104,9 @@ class World(WorldSpaces):
         self._seeded, self.seeds = False, np.zeros(b, np.uint64)
         """Seed of each world (B,)."""
         self._scatters = physics.any_of(*SCATTER)
-        contact = ("contact",) if self._scatters else ()
-        self._streams = StreamSet(b, "start", "physics", "sensor", "serve", *contact)
+        more: tuple[str, ...] = ("contact",) if self._scatters else ()
+        more += (STREAM,) if PuckMarks.exist(physics) else ()
+        self._streams = StreamSet(b, "start", "physics", "sensor", "serve", *more)
         self._episode = EpisodeCounters.empty(b, len(seats))
         self._state, self._memory = scene.still_state(b), Memory()
         self._sensed = self._best = self._judged = self._state

@@ -1,0 +1,78 @@
+"""The tracker of the puck, on the lab's images without real time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from marl_airhockey.hardware.camera import CameraFrame
+from marl_airhockey.hardware.lab.setup import LabSetup
+from marl_airhockey.hardware.lab.table_camera import Seen, TableCamera, lab_view
+from marl_airhockey.hardware.lab.world import RATE, LabWorld
+from marl_airhockey.hardware.table.tracker import Tracker
+from marl_airhockey.hardware.vision import Colour, Detector
+from marl_airhockey.sim.core.physics import Physics
+
+SETUP = LabSetup()
+TABLE = SETUP.geometry
+VIEW = lab_view(TABLE)
+HOME = np.array(SETUP.home)
+STILL = np.zeros(2)
+EVERY = 4  # Steps of the world in a period of the camera, 30 frames/s.
+
+
+@pytest.fixture(scope="module")
+def colour():
+    camera = TableCamera(TABLE, VIEW, np.array([-1.185, 0.0]))
+    image = camera.photograph(Seen(np.array([0.3, 0.0]), STILL, HOME, STILL))
+    x, y = VIEW.project(np.array([[0.3, 0.0, 0.003]]))[0]
+    return Colour.around(image, (x, y))
+
+
+def spins(marked, colour, flights=12):
+    """True and estimated spins (n,), rad/s, after bounces off the long sides."""
+    camera = TableCamera(TABLE, VIEW, np.array([-1.185, 0.0]), marked=marked)
+    half = tuple(TABLE.size / 2)
+    detector = Detector(VIEW, colour, TABLE.puck_radius, half, marked=marked)
+    world, rng, pairs = LabWorld(SETUP, 0), np.random.default_rng(0), []
+    tracker = Tracker(world.scene, Physics(world.scene.defaults, "ur5e"))
+    for _ in range(flights):
+        heading = rng.choice([-1.0, 1.0]) * rng.uniform(0.7, 1.2)
+        velocity = 1.5 * np.array([np.cos(heading), np.sin(heading)])
+        world.put(np.array([0.2, 0.0]), velocity, held=False)
+        state = world._state
+        turn = np.array([[0.0, rng.uniform(-25.0, 25.0)]])
+        world._state = world._begin(replace(state, spin=turn))
+        start = world.time
+        seen = []
+        tracker.forget()
+        for k in range(1, int(0.8 * RATE)):
+            world.step(HOME, STILL, 0.0)
+            if k % EVERY:
+                continue
+            turn = world.puck_angle, world.puck_spin
+            scene = Seen(world.puck, world.puck_velocity, HOME, STILL, *turn)
+            frame = CameraFrame(camera.photograph(scene, k), world.time, k)
+            seen.append(detector.find(frame))
+            if len(seen) == 2:
+                tracker.begin(seen)
+            elif len(seen) > 2:
+                state = world.scene.still_state(1)
+                track = np.array([[start, *HOME], [world.time, *HOME]])
+                now = world.time
+                tracker.fill(state, seen[-1:], track, now, now - EVERY / RATE)
+                pairs.append((world.puck_spin, float(state.spin[0, 1])))
+    return np.array(pairs).T
+
+
+def test_the_spin_of_a_marked_puck_is_tracked(colour):
+    true, found = spins(True, colour)
+    assert true.std() > 2.0
+    assert np.sqrt(np.mean((found - true) ** 2)) < 0.35 * true.std()
+    assert np.median(np.abs(found - true)) < 0.5
+
+
+def test_the_spin_of_a_puck_without_a_mark_is_not_known(colour):
+    true, found = spins(False, colour)
+    assert np.isfinite(found).all()
+    assert np.median(np.abs(found - true)) > 3.0
