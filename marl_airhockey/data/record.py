@@ -17,6 +17,7 @@ from marl_airhockey.rollouts.columns import (
     episode_notes,
     first_columns,
     head_of,
+    of_single_world,
     step_columns,
 )
 from marl_airhockey.rollouts.play import play
@@ -202,8 +203,7 @@ def _record_live(world: World, writer: RecordingWriter, film: Film | None) -> No
     """
 
     def only(columns: Columns) -> Columns:
-        shown = columns | (film_columns(film) if film else {})
-        return {name: value[0] for name, value in shown.items()}
+        return of_single_world(columns | (film_columns(film) if film else {}))
 
     writer.begin(only(first_columns(world)), *episode_notes(world))
     reason = PLAYED

@@ -25,9 +25,10 @@ from marl_airhockey.rollouts.columns import (
     episode_notes,
     first_columns,
     head_of,
+    of_single_world,
     step_columns,
 )
-from marl_airhockey.sim.core.recording import PLAYED, Columns
+from marl_airhockey.sim.core.recording import PLAYED
 from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
@@ -104,11 +105,13 @@ def import_games(path: Path, out: Path) -> Path:
         with whole_recording(out, head) as writer:
             for episode in games.episodes:
                 world.reset(seed=episode.seed)
-                writer.begin(_only(first_columns(world)), *episode_notes(world))
+                writer.begin(
+                    of_single_world(first_columns(world)), *episode_notes(world)
+                )
                 reason = episode.reason
                 for numbers, over in _played(world, episode.actions):
                     digest.update(numbers.tobytes())
-                    writer.add(_only(step_columns(world)))
+                    writer.add(of_single_world(step_columns(world)))
                     reason = PLAYED if over else reason
                 writer.end(reason)
             if digest.hexdigest() != games.hash:
@@ -158,8 +161,3 @@ def _player(row: dict[str, Any]) -> dict[str, Any]:
         "handicap": {str(k): float(v) for k, v in handicap.items()},
         "person": None if person is None else str(person)[:200],
     }
-
-
-def _only(columns: Columns) -> Columns:
-    """Return the columns of a batch with a single world, without the batch axis."""
-    return {name: value[0] for name, value in columns.items()}

@@ -22,9 +22,14 @@ from marl_airhockey.data.parquet import EXTRA, warm_up
 from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.hardware.camera import Camera, Film
 from marl_airhockey.play.live_match import LiveMatch
-from marl_airhockey.rollouts.columns import episode_notes, head_of, step_columns
+from marl_airhockey.rollouts.columns import (
+    episode_notes,
+    head_of,
+    of_single_world,
+    step_columns,
+)
 from marl_airhockey.sim.core.errors import require
-from marl_airhockey.sim.core.recording import FILM, Columns
+from marl_airhockey.sim.core.recording import FILM
 
 
 class Recorder:
@@ -98,7 +103,9 @@ class Recorder:
             self._kept.append(path)
             if self._camera is not None:
                 self._film = Film(self._camera, path / FILM)
-            self._writer.begin(_only(match.first), *episode_notes(match.world))
+            self._writer.begin(
+                of_single_world(match.first), *episode_notes(match.world)
+            )
 
     def step(self, match: LiveMatch, **pages: Any) -> None:
         """Add the last step of a match.
@@ -109,10 +116,10 @@ class Recorder:
         """
         if self._writer is None or match.result is None:
             return
-        row = {**_only(step_columns(match.world)), **pages}
+        row = {**of_single_world(step_columns(match.world)), **pages}
         row["clock"] = np.array(time.time())
         if self._film is not None:
-            row |= _only(film_columns(self._film))
+            row |= of_single_world(film_columns(self._film))
         with self._giving_up():
             self._writer.add(row)
 
@@ -149,8 +156,3 @@ class Recorder:
     def trouble(self) -> str:
         """Error of the video that is being written; "" for none."""
         return self._film.trouble if self._film is not None else ""
-
-
-def _only(columns: Columns) -> Columns:
-    """Return the columns of a batch with a single world, without the batch axis."""
-    return {name: value[0] for name, value in columns.items()}

@@ -103,6 +103,11 @@ def step_columns(world: World, names: Collection[str] | None = None) -> Columns:
     return _columns(BEFORE, world, names) | _columns(AFTER, world, names)
 
 
+def of_single_world(columns: Columns) -> Columns:
+    """Return the columns (1, ...) of a single world without the batch axis."""
+    return {name: value[0] for name, value in columns.items()}
+
+
 def _columns(
     sources: Mapping[str, Callable[[World], Columns]],
     world: World,

@@ -18,7 +18,8 @@ POINTS = 24
 """Number of points on each circle."""
 CLEAR = 0.12
 """Least contrast of a mark: amplitude of the second harmonic of the colour around the
-centre, as a share of its mean. Pucks without a mark have less than 0.05."""
+centre, as a share of its mean. In the virtual lab it is at most 0.01 without a
+mark, and at least 0.2 with a mark and up to 2 m/s."""
 NOISE = 0.025
 """Standard deviation of an orientation, rad: 0.018 to 0.024 in the virtual lab, with a
 puck of 18 px and up to 2 m/s. `tests/hardware/test_vision.py` measures it."""

@@ -92,7 +92,7 @@ class Display:
 
     @final
     def shown_marks(self, state: State, memory: Memory) -> list[Mark]:
-        """Return the marks that are drawn in one world, including the regions."""
+        """Return the visible marks of one world, including the regions."""
         return [mark for mark in self.all_marks(state, memory) if mark.shown]
 
     @final

@@ -1,4 +1,4 @@
-"""Marks and captions: shapes and texts that are drawn on the table.
+"""Marks and captions: shapes and texts on the image of a table.
 
 Like the rules, they are written for arrays with any leading axes (...). They can
 therefore be compiled and exported together with the rules.
