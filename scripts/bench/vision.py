@@ -232,7 +232,10 @@ def main() -> None:
         if given.marked:
             print(f"  mark read {m['read']:.1%}, orientation {m['angle']:.3f} rad RMS")
     if given.out:
-        rows = {k: {n: round(x, 4) for n, x in m.items()} for k, m in found.items()}
+        rows = {
+            k: {n: round(x, 4) for n, x in m.items() if np.isfinite(x)}
+            for k, m in found.items()
+        }
         given.out.write_text(json.dumps(rows, indent=1) + "\n")
 
 

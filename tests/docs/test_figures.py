@@ -424,3 +424,25 @@ def test_figures_of_marked_pucks_are_those_of_their_rows():
         if name == "vision_marked":
             assert line["bar read"] == f"{100 * row['read']:.1f} %"
             assert line["orientation error, RMS"] == f"{row['angle']:.3f} rad"
+
+
+def test_accuracies_of_the_vision_are_those_of_their_rows():
+    rows = json.loads((DATA / "vision_plain.json").read_text())
+    shown = table("docs/robot_results.md", "position error, mean")
+    for line, row in zip(shown, rows.values(), strict=True):
+        assert line["position error, mean"] == f"{row['mean']:.2f} mm"
+        assert line["position error, 95 % quantile"] == f"{row['p95']:.2f} mm"
+        assert line["velocity error, RMS"] == f"{row['rmse']:.3f} m/s"
+
+
+def test_errors_of_calibrated_cameras_are_those_of_their_rows():
+    rows = json.loads((DATA / "camera_map.json").read_text())
+    shown = table("docs/robot_results.md", "outside, median")
+    for line, row in zip(shown, rows.values(), strict=True):
+        least, most = (row[f"inside_sd_per_axis_{end}"] for end in ("best", "worst"))
+        assert list(line.values())[1:] == [
+            f"{row['inside_median']:.2f}",
+            f"{row['inside_median_worst']:.2f}",
+            f"{least:.2f} .. {most:.2f}",
+            f"{row['outside_median']:.2f}",
+        ]

@@ -21,6 +21,7 @@ from marl_airhockey.hardware.vision.calibration import (
     tag_corners,
     view_from_clicks,
     view_from_tags,
+    view_from_tags_and_edges,
     view_trouble,
 )
 from marl_airhockey.hardware.vision.mark import NOISE
@@ -174,6 +175,35 @@ def test_tags_find_the_camera_better_than_clicks(camera):
     off = np.linalg.norm(by_clicks.to_table(VIEW.project(flat)) - grid(), axis=1)
     assert by_tags.mean() < off.mean() < 0.02
     assert moved(view, seen, KNOWN) < 1.0
+
+
+def measured_tags(rng, error):
+    return {k: four + rng.normal(0.0, error, 2) for k, four in KNOWN.items()}
+
+
+def test_edges_correct_tags_that_were_measured_badly(camera):
+    image, corners = camera.photograph(Seen(None, STILL, HOME, STILL)), TABLE.vertices
+    seen, flat = find_tags(image), np.column_stack([grid(), np.zeros(45)])
+    rng, off = np.random.default_rng(0), []
+    for _ in range(5):
+        known = measured_tags(rng, 0.001)
+        both = seen, known, image, np.asarray(corners), VIEW.lens
+        views = view_from_tags(seen, known, VIEW.lens), view_from_tags_and_edges(*both)
+        places = [view.to_table(VIEW.project(flat)) for view in views]
+        off.append([np.linalg.norm(each - grid(), axis=1).mean() for each in places])
+    tags, edges = np.mean(off, axis=0)
+    assert edges < 0.0004 < tags
+
+
+def test_tags_that_do_not_fit_the_edges_are_named(camera):
+    image, lens = camera.photograph(Seen(None, STILL, HOME, STILL)), VIEW.lens
+    seen, corners = find_tags(image), np.asarray(TABLE.vertices)
+    wrong = {**KNOWN, 3: KNOWN[3] + np.array([0.0, 0.009])}
+    with pytest.raises(ValueError, match=r"tag 3 is [78] mm from its measured"):
+        view_from_tags_and_edges(seen, wrong, image, corners, lens)
+    # The field of another table.
+    with pytest.raises(ValueError, match=r"not seen|from its measured|fit to"):
+        view_from_tags_and_edges(seen, KNOWN, image, 0.95 * corners, lens)
 
 
 def test_what_cannot_be_a_calibration_is_refused(camera):

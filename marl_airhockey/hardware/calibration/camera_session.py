@@ -21,7 +21,7 @@ from marl_airhockey.hardware.vision.boards import (
 from marl_airhockey.hardware.vision.calibration import (
     find_tags,
     view_from_clicks,
-    view_from_tags,
+    view_from_tags_and_edges,
 )
 from marl_airhockey.hardware.vision.edges import refine_corners
 from marl_airhockey.hardware.vision.lens import CameraView, Lens
@@ -59,7 +59,7 @@ class CameraSession:
         radius: Radius of the paddle on the field, m.
         path: Path of the rig's file.
         measured: Measured corners (4, 2) of tags by number, field frame, m; None to
-            find the view by the field's edges.
+            find the view by clicks and the field's edges alone.
     """
 
     def __init__(
@@ -145,16 +145,17 @@ class CameraSession:
         seen = [find_tags(image) for image in images]
         steady = set(seen[0]).intersection(*seen[1:])
         tags = {k: np.mean([each[k] for each in seen], axis=0) for k in steady}
+        mean, count = np.mean(images, axis=0).astype(np.uint8), len(self._corners)
         if self._measured is not None:
-            self.found.view = view_from_tags(tags, self._measured, lens)
-            self.found.tags = dict(self._measured)
-            return
-        count = len(self._corners)
-        if len(self.found.corners) < count:
+            view = view_from_tags_and_edges(
+                tags, self._measured, mean, self._corners, lens
+            )
+        elif len(self.found.corners) < count:
             raise ValueError(f"click all {count} corners of the playing field first")
-        mean = np.mean(images, axis=0).astype(np.uint8)
-        fine = refine_corners(mean, np.array(self.found.corners), lens)
-        view = self.found.view = view_from_clicks(fine, self._corners, lens)
+        else:
+            fine = refine_corners(mean, np.array(self.found.corners), lens)
+            view = view_from_clicks(fine, self._corners, lens)
+        self.found.view = view
         self.found.tags = {k: view.to_table(four) for k, four in tags.items()}
 
     def click_paddle(self, x: float, y: float) -> None:

@@ -45,12 +45,21 @@ def through_lens(view: CameraView, scene: Array) -> Array:
 
 
 def draw_polygon(image: Array, pixels: Array, colour: tuple[int, int, int]) -> None:
-    """Fill a polygon (n, 2), px."""
-    # OpenCV paints pixels on the edge completely, so shrink the polygon by 0.5 px.
-    offsets = pixels - pixels.mean(0)
-    inner = pixels - 0.5 * offsets / np.linalg.norm(offsets, axis=1, keepdims=True)
-    corners = np.round(inner * 2**SHIFT).astype(np.int32)
+    """Fill a convex polygon (n, 2), px."""
+    # OpenCV paints pixels on the edge completely, so move every edge inward by 0.5 px.
+    corners = np.round(_inset(pixels, 0.5) * 2**SHIFT).astype(np.int32)
     cv2.fillPoly(image, [corners], colour, cv2.LINE_AA, SHIFT)
+
+
+def _inset(corners: Array, distance: float) -> Array:
+    """Return the corners (n, 2) of a convex polygon whose edges are moved inward."""
+    along = np.roll(corners, -1, axis=0) - corners
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    left = np.stack([-along[:, 1], along[:, 0]], 1)
+    before = np.roll(left, 1, axis=0)
+    side = np.sign(np.sum(left * (corners.mean(0) - corners)))
+    both = (before + left) / (1.0 + (before * left).sum(1, keepdims=True))
+    return np.asarray(corners + side * distance * both)
 
 
 def fill(

@@ -73,7 +73,7 @@ def _line(image: Array, start: Array, end: Array, lens: Lens, k: int) -> Array:
         if good.sum() < FEWEST:
             raise ValueError(
                 f"the edge between corners {k + 1} and {k + 2} is not seen; click "
-                "where the playing field meets the rail"
+                "where the playing field meets the rail, or measure the tags again"
             )
         slope, offset = np.polyfit(position[good], found[good], 1)
         off = np.abs(found - offset - slope * position) * matrix[0, 0]

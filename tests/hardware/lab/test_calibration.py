@@ -13,11 +13,11 @@ from marl_airhockey.hardware.camera import Camera, open_source
 from marl_airhockey.hardware.hand_rig import HandRig
 from marl_airhockey.hardware.lab.hand_camera import hand_view
 from marl_airhockey.hardware.lab.lab import LabClient, served
-from marl_airhockey.hardware.lab.table_camera import lab_view
+from marl_airhockey.hardware.lab.table_camera import lab_view, tag_places
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot.ur5e import PoseReader
 from marl_airhockey.hardware.vision.boards import find_board
-from marl_airhockey.hardware.vision.calibration import find_tags
+from marl_airhockey.hardware.vision.calibration import find_tags, tag_corners
 
 BESIDE = np.array([0.029, 0.0, 0.06])
 """Way from the middle of a paddle's foot to where it is seen beside the arm, m"""
@@ -32,6 +32,7 @@ def session(lab, tmp_path):
         with Camera(open_source(rig["camera"])) as camera:
             pose = PoseReader(lab.host).pose
             made = CalibrationSession(camera, pose, rig, tmp_path / "rig.json")
+            made.devices = camera, pose, rig
             made.orders.update(Helper(client).orders)
             yield made
         client.close()
@@ -66,6 +67,16 @@ def test_a_calibration_from_nothing_finds_what_is_there(lab, session, tmp_path):
     grid = np.array([(x, y, 0.0) for x in (-0.8, 0.0, 0.8) for y in (-0.3, 0.3)])
     off = rig.view.to_table(view.project(grid)) - grid[:, :2]
     assert np.linalg.norm(off, axis=1).max() < 0.003
+    # The same with tags that a person has measured to 1 mm, instead of clicks.
+    tags = {
+        k: tag_corners(place + rng.normal(0.0, 0.001, 2))
+        for k, place in tag_places(lab.setup.geometry).items()
+    }
+    again = CalibrationSession(*session.devices, tmp_path / "tags.json", tags)
+    again.found.lens = session.found.lens
+    again.do("table")
+    off = again.found.view.to_table(view.project(grid)) - grid[:, :2]
+    assert np.linalg.norm(off, axis=1).mean() < 0.001
     true = lab.setup.mounting
     places = np.array(lab.setup.seat.reach)
     apart = [true.pose(p)[:3] - rig.mounting.pose(p)[:3] for p in places]

@@ -185,6 +185,13 @@ def test_what_is_wrong_with_the_picture_is_noticed_first(rig, fault, name, words
         ah.parallel_env("juggle", **keywords(rig))
 
 
+def test_a_puck_without_the_mark_of_its_rig_is_noticed_first(rig, tmp_path):
+    marked = tmp_path / "rig.json"
+    dataclasses.replace(Rig.load(rig), puck_marked=True).save(marked)
+    with pytest.raises(RuntimeError, match="shows no mark"):
+        ah.parallel_env("juggle", **keywords(marked))
+
+
 def test_what_the_rig_says_need_not_be_said(rig):
     env = ah.parallel_env("reach", backend="real", rig=str(rig))
     try:
