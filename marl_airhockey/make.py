@@ -45,7 +45,8 @@ def parallel_env(
             - seats (str, default of the scenario): Workspace and speed of the paddles:
               "robot" (limits of a UR5e) or "arcade".
             - profile (str or Path, default "ideal"): Sensing, actuation and variation
-              of the physics: "ideal", "ur5e", "ur5e-authors", "gantry", or a TOML file.
+              of the physics: "ideal", "ur5e", "ur5e-calibrated", "ur5e-authors",
+              "gantry", or a TOML file.
             - observe (str, default "velocity" with the profile "ideal", otherwise
               "history"): Observation type: "velocity", "estimate", "history" or
               "pixels", see `observable.OBSERVE`.

@@ -39,9 +39,9 @@ Backend = Annotated[
 Profile = Annotated[
     str | None,
     typer.Option(
-        help="Sensing and actuation: ideal, ur5e, ur5e-authors, gantry, or a file of "
-        "airhockey fit-table; by default the profile in which the policy was trained, "
-        "else ideal."
+        help="Sensing and actuation: ideal, ur5e, ur5e-calibrated, ur5e-authors, "
+        "gantry, or a file of airhockey fit-table; by default the profile in which "
+        "the policy was trained, else ideal."
     ),
 ]
 Options = Annotated[

@@ -41,8 +41,9 @@ def precompile(
     profile: Annotated[
         list[str] | None,
         typer.Option(
-            help="Sensing and actuation: ideal (the default), ur5e, ur5e-authors, "
-            "gantry, or a file of airhockey fit-table. Can be repeated."
+            help="Sensing and actuation: ideal (the default), ur5e, "
+            "ur5e-calibrated, ur5e-authors, gantry, or a file of airhockey fit-table. "
+            "Can be repeated."
         ),
     ] = None,
     target: Annotated[

@@ -40,8 +40,8 @@ def train(
     profile: Annotated[
         str | None,
         typer.Option(
-            help="Sensing and actuation: ideal, ur5e, ur5e-authors, gantry, or a file "
-            "of airhockey fit-table; by default ideal."
+            help="Sensing and actuation: ideal, ur5e, ur5e-calibrated, ur5e-authors, "
+            "gantry, or a file of airhockey fit-table; by default ideal."
         ),
     ] = None,
     steps: Annotated[

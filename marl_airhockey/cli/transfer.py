@@ -49,8 +49,8 @@ def transfer(
     profile: Annotated[
         str,
         typer.Option(
-            help="Profiles, separated by commas: ideal, ur5e, ur5e-authors, gantry, or "
-            "files of airhockey fit-table."
+            help="Profiles, separated by commas: ideal, ur5e, ur5e-calibrated, "
+            "ur5e-authors, gantry, or files of airhockey fit-table."
         ),
     ] = "ideal,ur5e",
     episodes: Annotated[

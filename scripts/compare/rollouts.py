@@ -34,6 +34,7 @@ CASES: dict[str, dict[str, Any]] = {
     "history": {"observe": "history"},
     "ur5e": {"profile": "ur5e"},
     "ur5e estimate": {"profile": "ur5e", "observe": "estimate"},
+    "calibrated estimate": {"profile": "ur5e-calibrated", "observe": "estimate"},
     "authors": {"profile": "ur5e-authors"},
     "gantry": {"profile": "gantry"},
     "pixels": {"profile": "ur5e", "observe": "pixels"},

@@ -13,6 +13,7 @@ from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.hardware.rig import LATEST
 from marl_airhockey.hardware.robot import MotionLimits
 from marl_airhockey.registry import scenario_names, zoo_names
+from marl_airhockey.sim.core.profiles import PROFILES
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "docs/data"
@@ -446,3 +447,21 @@ def test_errors_of_calibrated_cameras_are_those_of_their_rows():
             f"{least:.2f} .. {most:.2f}",
             f"{row['outside_median']:.2f}",
         ]
+
+
+def test_the_calibrated_profile_has_the_intervals_of_the_fits():
+    profile, middle = PROFILES["ur5e-calibrated"], PROFILES["ur5e"]
+    for name in ("puck_drag", "wall_restitution", "paddle_restitution"):
+        rows = [r for r in rows_of("fitted_tables.csv") if r["parameter"] == name]
+        half = mean([(float(r["high"]) - float(r["low"])) / 2 for r in rows])
+        low, high = profile.ranges[name]
+        assert (high - low) / 2 == pytest.approx(half, rel=0.1)
+        assert low + high == pytest.approx(sum(middle.ranges[name]), abs=1e-9)
+    vision = json.loads((DATA / "vision_marked.json").read_text())
+    row = vision["tags of measured places"]
+    assert profile.ranges["angle_noise"][1] == pytest.approx(row["angle"], abs=5e-4)
+    dropout = profile.ranges["angle_dropout"][1]
+    assert dropout == pytest.approx(1.0 - row["read"], abs=5e-4)
+    row = json.loads((DATA / "camera_map.json").read_text())["tags and edges"]
+    ends = [1e-3 * row[f"inside_sd_per_axis_{end}"] for end in ("best", "worst")]
+    assert profile.ranges["calibration_error"] == pytest.approx(ends, abs=1e-6)
