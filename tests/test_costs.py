@@ -24,12 +24,12 @@ def report(summary, name, cost, when="call", **change):
 
 
 def test_a_test_that_costs_too_much_fails_the_run(summary):
-    report(summary, "tests/test_a.py::test_dear", 5.0, when="setup")
-    report(summary, "tests/test_a.py::test_cheap", 7.9)
+    report(summary, "tests/test_a.py::test_dear", 7.0, when="setup")
+    report(summary, "tests/test_a.py::test_cheap", 11.9)
     assert not list(summary.faults())
-    report(summary, "tests/test_a.py::test_dear", 5.0)
+    report(summary, "tests/test_a.py::test_dear", 7.0)
     (fault,) = summary.faults()
-    assert fault.startswith("tests/test_a.py::test_dear costs 10.0 CPU-s of 8")
+    assert fault.startswith("tests/test_a.py::test_dear costs 14.0 CPU-s of 12")
     session = SimpleNamespace(exitstatus=0)
     summary.pytest_sessionfinish(session)
     assert session.exitstatus == pytest.ExitCode.TESTS_FAILED

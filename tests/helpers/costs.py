@@ -15,8 +15,9 @@ import pytest
 
 from marl_airhockey.sim.jit.folders import code_folder
 
-MOST = 8.0
-"""CPU-seconds of a test without the mark `slow`"""
+MOST = 12.0
+"""CPU-seconds of a test without the mark `slow`; on the same machine, the same work
+takes up to half as long again if its neighbours are busy"""
 ENOUGH = 3.0
 """CPU-seconds below which a test of `EXPENSIVE` needs no reason"""
 EXPENSIVE = {
