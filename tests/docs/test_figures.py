@@ -465,3 +465,16 @@ def test_the_calibrated_profile_has_the_intervals_of_the_fits():
     row = json.loads((DATA / "camera_map.json").read_text())["tags and edges"]
     ends = [1e-3 * row[f"inside_sd_per_axis_{end}"] for end in ("best", "worst")]
     assert profile.ranges["calibration_error"] == pytest.approx(ends, abs=1e-6)
+
+
+def test_what_each_error_costs_is_that_of_its_rows():
+    tasks = "hit_goal", "move_block", "hit_goal_velocity"
+    rows = rows_of("ceilings.csv")
+    shown = table("docs/task_results.md", "unknown to the planner")
+    for name in tasks:
+        of = [row for row in rows if row["task"] == name]
+        assert [line[name] for line in shown] == [
+            f"{float(row['success']):.2f}" for row in of
+        ]
+        for row in of:
+            assert float(row["high"]) - float(row["low"]) < 0.1
