@@ -155,11 +155,11 @@ def _strike(
     legal = below.any(-1) & ((paddle >= low) & (paddle <= high)).all(-1)
     push = physics["paddle_speed"] * draws[:, 2]
     laws = physics["paddle_restitution"], physics["paddle_friction"]
-    return struck, legal & _hit(struck, normal, push, *laws)
+    return struck, legal & hit_pucks(struck, normal, push, *laws)
 
 
 @compiled()
-def _hit(
+def hit_pucks(
     puck: Array, normal: Array, push: Array, restitution: Array, friction: Array
 ) -> Array:
     """Hit pucks (W, 5), in place, with paddles that move along contact normals.

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.sim.core.geometry import half_planes, length
-from marl_airhockey.sim.core.laws import bounce
 from marl_airhockey.sim.core.table import GRAVITY
-from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.sim.world.world import World
+from marl_airhockey.toolkit.shots import hit_pucks
 from marl_airhockey.toolkit.starts import roll
 from marl_airhockey.types import Array
 
@@ -34,18 +33,6 @@ SOONEST = 0.01
 """Shortest time from a plan to the contact, s."""
 RUN_UP = 0.05
 """Longest time for which the paddle moves before the contact, s."""
-
-
-@compiled()
-def strike(
-    puck: Array, angle: Array, push: Array, restitution: Array, friction: Array
-) -> None:
-    """Hit pucks (n, 5), in place, with paddles that move along contact normals."""
-    for k in range(len(puck)):
-        nx, ny = np.cos(angle[k]), np.sin(angle[k])
-        closing = push[k] - nx * puck[k, 2] - ny * puck[k, 3]
-        if closing > 0.0:
-            bounce(puck[k], nx, ny, closing, 0.0, restitution[k], friction[k])
 
 
 # Misses of paths: below 1 for a success.
@@ -191,9 +178,13 @@ def plan(
         legal = inside(world, contact, velocity) & inside(world, start, velocity)
         legal &= (wait > SOONEST) & (share > 0.0) & (share <= 1.0)
         hit = np.tile(struck, (len(BESIDE), 1))
-        leans, push = np.tile([angle, top * share], len(BESIDE))
+        lean, push = (
+            np.tile(angle, len(BESIDE)) + beside,
+            np.tile(top * share, len(BESIDE)),
+        )
+        leans = np.stack([np.cos(lean), np.sin(lean)], -1)
         bounces = many.laws["paddle_restitution"], many.laws["paddle_friction"]
-        strike(hit, leans + beside, push, *bounces)
+        hit_pucks(hit, leans, push, *bounces)
         missed = miss(roll(hit, STEP, STEPS, half, many.laws), many)
         score = missed.reshape(len(BESIDE), w, n).mean(0)
         score = np.where(legal.reshape(w, n), score, np.inf)

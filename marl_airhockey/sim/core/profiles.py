@@ -120,39 +120,38 @@ CAMERA_60 = {
     "false_detection": (0.0003, 0.002),
 }
 
+UR5E = {
+    **TABLES,
+    **CAMERA_60,
+    # Dead time of a command, then a servo. The servo was derived from 34 ms at a
+    # look-ahead of 0.03 s on related arms, for look-aheads of 0.05 .. 0.1 s.
+    "action_delay": (0.004, 0.010),
+    "servo_time": (0.050, 0.100),
+}
+
 PROFILES: dict[str, Profile] = {
     "ideal": Profile("no latency, no noise, physics as given"),
     "ur5e": Profile(
         "UR5e at 20 Hz with a camera of 60 frames/s, on tables as measured",
-        {
-            **TABLES,
-            **CAMERA_60,
-            # Dead time of a command, then a servo. The servo was derived from 34 ms at
-            # a look-ahead of 0.03 s on related arms, for look-aheads of 0.05 .. 0.1 s.
-            "action_delay": (0.004, 0.010),
-            "servo_time": (0.050, 0.100),
-        },
+        UR5E,
         {**TILT, **UNMEASURED},
         SLOPES,
     ),
     "ur5e-calibrated": Profile(
         "as ur5e, with a calibrated camera, a marked puck, and a table that was fitted",
         {
-            **TABLES,
-            **CAMERA_60,
+            **UR5E,
             # Ten cameras, calibrated by tags and edges: `scripts/bench/camera_map.py`.
             "calibration_error": (0.00014, 0.00056),
             # A bar that is seen in the lab: `scripts/bench/vision.py --marked`.
             "angle_noise": (0.02, 0.02),
             "angle_dropout": (0.016, 0.016),
-            # The middle of `ur5e`, with intervals that ten minutes of play leave in
-            # three labs: `scripts/reproduce/fitted_tables.py`.
+            # The middle of `ur5e`, with the intervals that 4 to 6 minutes of play leave
+            # in three labs: `scripts/reproduce/fitted_tables.py`.
             "puck_drag": (0.0236, 0.0264),
             "wall_restitution": (0.735, 0.795),
             "paddle_restitution": (0.51, 0.59),
             "slope": (0.0025, 0.0025),
-            "action_delay": (0.004, 0.010),
-            "servo_time": (0.050, 0.100),
         },
         {"tilt": (0.8758, 0.8782), **UNMEASURED},
         SLOPES,
