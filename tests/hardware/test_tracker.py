@@ -10,7 +10,7 @@ from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.lab.table_camera import Seen, TableCamera, lab_view
 from marl_airhockey.hardware.lab.world import RATE, LabWorld
 from marl_airhockey.hardware.table.tracker import Tracker
-from marl_airhockey.hardware.vision import Colour, Detector
+from marl_airhockey.hardware.vision import Colour, Detector, Sighting
 from marl_airhockey.sim.core.physics import Physics
 
 SETUP = LabSetup()
@@ -29,20 +29,19 @@ def colour():
     return Colour.around(image, (x, y))
 
 
-def spins(marked, colour, flights=12):
-    """True and estimated spins (n,), rad/s, after bounces off the long sides."""
+def flights(marked, colour, scene, count=12):
+    """Yield the world, its tracked state, and True at the first one of a flight."""
     camera = TableCamera(TABLE, VIEW, np.array([-1.185, 0.0]), marked=marked)
     half = tuple(TABLE.size / 2)
     detector = Detector(VIEW, colour, TABLE.puck_radius, half, marked=marked)
-    world, rng, pairs = LabWorld(SETUP, 0), np.random.default_rng(0), []
-    tracker = Tracker(world.scene, Physics(world.scene.defaults, "ur5e"))
-    for _ in range(flights):
+    world, rng = LabWorld(SETUP, 0), np.random.default_rng(0)
+    tracker = Tracker(scene, Physics(scene.defaults, "ur5e"))
+    for _ in range(count):
         heading = rng.choice([-1.0, 1.0]) * rng.uniform(0.7, 1.2)
         velocity = 1.5 * np.array([np.cos(heading), np.sin(heading)])
         world.put(np.array([0.2, 0.0]), velocity, held=False)
-        state = world._state
         turn = np.array([[0.0, rng.uniform(-25.0, 25.0)]])
-        world._state = world._begin(replace(state, spin=turn))
+        world._state = world._begin(replace(world._state, spin=turn))
         start = world.time
         seen = []
         tracker.forget()
@@ -51,17 +50,27 @@ def spins(marked, colour, flights=12):
             if k % EVERY:
                 continue
             turn = world.puck_angle, world.puck_spin
-            scene = Seen(world.puck, world.puck_velocity, HOME, STILL, *turn)
-            frame = CameraFrame(camera.photograph(scene, k), world.time, k)
+            view = Seen(world.puck, world.puck_velocity, HOME, STILL, *turn)
+            frame = CameraFrame(camera.photograph(view, k), world.time, k)
             seen.append(detector.find(frame))
             if len(seen) == 2:
                 tracker.begin(seen)
             elif len(seen) > 2:
-                state = world.scene.still_state(1)
+                path = np.zeros((1, 11, scene.bodies.movers, 4))
+                state = replace(scene.still_state(1), path=path)
                 track = np.array([[start, *HOME], [world.time, *HOME]])
                 now = world.time
                 tracker.fill(state, seen[-1:], track, now, now - EVERY / RATE)
-                pairs.append((world.puck_spin, float(state.spin[0, 1])))
+                yield world, state, len(seen) == 3
+
+
+def spins(marked, colour):
+    """True and estimated spins (n,), rad/s, after bounces off the long sides."""
+    scene = LabWorld(SETUP, 0).scene
+    pairs = [
+        (world.puck_spin, float(state.spin[0, 1]))
+        for world, state, _ in flights(marked, colour, scene)
+    ]
     return np.array(pairs).T
 
 
@@ -76,3 +85,29 @@ def test_the_spin_of_a_puck_without_a_mark_is_not_known(colour):
     true, found = spins(False, colour)
     assert np.isfinite(found).all()
     assert np.median(np.abs(found - true)) > 3.0
+
+
+def test_a_path_ends_at_the_newest_frame_and_has_no_gap(colour):
+    scene = replace(LabWorld(SETUP, 0).scene, path=True)
+    before, off = None, []
+    for world, state, begins in flights(False, colour, scene):
+        path = state.path[0, :, 1]
+        off.append(np.linalg.norm(path[-1, :2] - world.puck))
+        assert np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1).max() < 0.03
+        assert begins or np.array_equal(before, path[0])
+        before = path[-1]
+    assert np.median(off) < 0.002
+    assert max(off) < 0.02
+
+
+def test_a_path_without_a_new_frame_is_a_point(colour):
+    scene = replace(LabWorld(SETUP, 0).scene, path=True)
+    tracker = Tracker(scene, Physics(scene.defaults, "ur5e"))
+    first, second = (
+        Sighting(np.array([x, 0.0]), t, 1.0, STILL) for x, t in ((0.0, 0.0), (0.1, 0.1))
+    )
+    tracker.begin([first, second])
+    state = replace(scene.still_state(1), path=np.zeros((1, 11, 2, 4)))
+    tracker.fill(state, [], np.array([[0.0, *HOME], [0.2, *HOME]]), 0.2, 0.15)
+    assert state.puck[0, 0, 0] > 0.15  # It is predicted for now,
+    assert (state.path[0, :, 1] == (0.1, 0.0, 1.0, 0.0)).all()  # but was not seen there.

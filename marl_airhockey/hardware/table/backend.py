@@ -90,8 +90,6 @@ class RealBackend(LiveBackend):
             return "there are no blocks on the real table; use a simulation"
         if scene.pucks > 1:
             return f"there is one puck on the real table, not {scene.pucks}"
-        if scene.path:
-            return "the task needs the puck's path between two camera frames"
         if scene.physics.get("tilt") == 0.0:
             return "the real table is tilted, but this task needs a flat one"
         if scene.table not in TABLES.values():

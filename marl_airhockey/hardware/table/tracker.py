@@ -46,6 +46,9 @@ class Tracker:
         self._touching = False
         self._last_angle: tuple[float, float] = (-np.inf, np.nan)
         """Time, s, and orientation, rad, of the last sighting."""
+        self._trail: list[Array] = []
+        """Filtered x, y, m, and vx, vy, m/s, since the last call of `fill`, oldest
+        first. The first one is the newest of the call before."""
         self.last: MeasuredPuck | None = None
         """Newest sighting, filtered; None before an episode begins."""
         self.noise = 0.0
@@ -78,6 +81,7 @@ class Tracker:
             np.full((1, 1), last.taken),
         )
         self.last = MeasuredPuck(last.taken, last.place, velocity)
+        self._trail = [np.concatenate([last.place, velocity])]
 
     @property
     def estimate(self) -> Array | None:
@@ -93,6 +97,9 @@ class Tracker:
         since: float,
     ) -> None:
         """Fill a state with the present estimate of the puck and its contacts.
+
+        Its path, if it has one, ends at the newest sighting and not now: a prediction
+        must not decide a success.
 
         Args:
             state: State of one world, without contacts.
@@ -110,6 +117,25 @@ class Tracker:
         state.velocity[0, seats] = vx, vy
         state.spin[0, seats] = edge / self._scene.table.puck_radius
         state.touching[0, 0, 0] = self._touching
+        if state.path is not None:
+            self._fill_path(state, state.path[0])
+
+    def _fill_path(self, state: State, path: Array) -> None:
+        """Fill a path (rows, movers, 4) with the trail of the puck, and shorten it."""
+        movers = len(path[0])
+        path[..., :2], path[..., 2:] = (
+            state.position[0, :movers],
+            state.velocity[0, :movers],
+        )
+        rows = np.linspace(0, len(self._trail) - 1, len(path)).round().astype(int)
+        path[:, self._scene.bodies.paddles] = np.array(self._trail)[rows]
+        del self._trail[:-1]
+
+    def _extend_trail(self, begin: float, end: float, track: Array) -> None:
+        """Extend the trail from one sighting to the time of the next one, s."""
+        for moment in np.arange(begin + SPACING, end, SPACING):
+            self._update(np.zeros(2), 0.0, False, track, float(moment))
+            self._trail.append(self._estimator.now[0, 0, :4].copy())
 
     def _follow(
         self,
@@ -124,6 +150,7 @@ class Tracker:
         if last is not None and taken <= last.time:
             return
         if last is not None:
+            self._extend_trail(last.time, taken, track)
             self._update(np.zeros(2), 0.0, False, track, taken)
             off = sighting.place - self._estimator.now[0, 0, :2]
             self.innovations.add(off, taken - last.time)
@@ -131,6 +158,7 @@ class Tracker:
         readings = self._readings(sighting)
         self._update(sighting.place, taken, True, track, taken, readings)
         found = self._estimator.now[0, 0]
+        self._trail.append(found[:4].copy())
         new = self.last = MeasuredPuck(taken, found[:2].copy(), found[2:4].copy())
         apart = float(np.linalg.norm(new.place - sighting.place))
         self.noise += SMOOTHED * (apart - self.noise)

@@ -110,7 +110,7 @@ class State:
     """Time since the start of the episode (...), s."""
     path: Array | None = None
     """Columns x, y, vx, vy at every substep (..., K + 1, movers, 4); None unless the
-    scene requires it."""
+    scene requires it. On a real table the puck's path ends at the newest frame."""
 
     @property
     def paddle(self) -> Array:
