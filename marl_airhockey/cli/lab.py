@@ -50,6 +50,10 @@ def open_lab(
             help="Use a puck with a bar on it, by which the camera sees its spin.",
         ),
     ] = False,
+    block: Annotated[
+        bool,
+        typer.Option("--block", help="Put a block on the table, for move_block."),
+    ] = False,
     demo: Annotated[
         bool,
         typer.Option(
@@ -76,7 +80,9 @@ def open_lab(
         running.close()
         raise RuntimeError("lab: another lab is already running; stop it first")
     with waiting("opening the lab (the first time takes longer)"):
-        opened = Lab(LabSetup(plant=plant, marked=marked), seed, frame_rate)
+        opened = Lab(
+            LabSetup(plant=plant, marked=marked, block=block), seed, frame_rate
+        )
     # Ctrl+C can come as soon as the RPC server is open, so all of it is covered.
     with contextlib.suppress(KeyboardInterrupt), opened, served(opened):
         if demo:

@@ -77,6 +77,8 @@ class Rig:
     puck_marked: bool = False
     """True for a puck with a mark, by which the camera sees its spin, see
     `vision.mark`."""
+    block: Colour | None = None
+    """Colour of the block; None without one."""
     paddle: Colour | None = None
     """Colour of the paddle's top, for its detection in videos; None if unknown."""
     made: str = ""

@@ -9,6 +9,7 @@ from marl_airhockey.hardware.camera import CameraFrame
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.lab.table_camera import Seen, TableCamera, lab_view
 from marl_airhockey.hardware.lab.world import RATE, LabWorld
+from marl_airhockey.hardware.table.block_tracker import BlockTracker
 from marl_airhockey.hardware.table.tracker import Tracker
 from marl_airhockey.hardware.vision import Colour, Detector, Sighting
 from marl_airhockey.sim.core.physics import Physics
@@ -110,4 +111,42 @@ def test_a_path_without_a_new_frame_is_a_point(colour):
     state = replace(scene.still_state(1), path=np.zeros((1, 11, 2, 4)))
     tracker.fill(state, [], np.array([[0.0, *HOME], [0.2, *HOME]]), 0.2, 0.15)
     assert state.puck[0, 0, 0] > 0.15  # It is predicted for now,
-    assert (state.path[0, :, 1] == (0.1, 0.0, 1.0, 0.0)).all()  # but was not seen there.
+    assert (
+        state.path[0, :, 1] == (0.1, 0.0, 1.0, 0.0)
+    ).all()  # but was not seen there.
+
+
+def test_a_block_rests_until_it_is_hit_and_then_follows():
+    """Of the images of a puck that flies at a block."""
+    setup = LabSetup(block=True)
+    world, start = LabWorld(setup, 0), np.array([0.3, 0.1])
+    camera = TableCamera(TABLE, VIEW, np.array([-1.185, 0.0]))
+
+    def frame():
+        seen = Seen(world.puck, world.puck_velocity, HOME, STILL, block=world.block)
+        return CameraFrame(camera.photograph(seen), world.time, 0)
+
+    world.put(np.array([-0.1, 0.1]), np.array([1.5, 0.0]), held=False, block=start)
+    x, y = VIEW.project(np.array([[*start, 0.003]]))[0]
+    blue = Colour.around(frame().image, (x, y))
+    half = tuple(TABLE.size / 2)
+    detector = Detector(VIEW, blue, world.scene.block_radius, half)
+    tracker, state = BlockTracker(), world.scene.still_state(1)
+    tracker.begin(detector.find(frame()))
+    rests = 0
+    for k in range(1, int(1.2 * RATE)):
+        world.step(HOME, STILL, 0.0)
+        if k % EVERY:
+            continue
+        tracker.fill(state, [detector.find(frame())])
+        place, velocity = world.block
+        assert np.linalg.norm(state.block[0, 0] - place) < 0.004
+        if (place == start).all():
+            rests += 1
+            assert not state.block_velocity.any()
+        else:
+            # A mean over the period of the camera.
+            off = np.linalg.norm(state.block_velocity[0, 0] - velocity)
+            assert off < 0.1 + 0.6 * np.linalg.norm(velocity)
+    assert rests > 3
+    assert np.linalg.norm(place - start) > 0.05

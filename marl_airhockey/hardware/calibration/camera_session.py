@@ -103,7 +103,7 @@ class CameraSession:
                 f"{order!r} is unknown; expected one of {', '.join(self.orders)}"
             )
         with self._busy:
-            if order in ("corner", "puck", "paddle"):
+            if order in ("corner", "puck", "block", "paddle"):
                 self.orders[order](float(x), float(y))
             else:
                 self.orders[order]()

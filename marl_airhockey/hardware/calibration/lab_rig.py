@@ -37,6 +37,8 @@ PICTURES = 8
 """Number of frames over which the corners of tags are averaged."""
 CLICKED = np.array([[0.3, 0.0, 0.003]])
 """Position (1, 3) of the puck while its colour is clicked, table frame, m."""
+BLOCK = np.array([[0.3, 0.25, 0.003]])
+"""The same for the block."""
 RIM, DIRECTIONS = 0.034, 16
 """Distance of possible clicks from the centre of the arm's paddle, m, and number of
 their directions; the arm never hides all of them."""
@@ -62,13 +64,14 @@ def calibrate_lab(client: LabClient) -> Rig:
     table = TABLES[info["table"]]
     known = {k: tag_corners(place) for k, place in tag_places(table).items()}
     source = f"stream:{info['camera']}"
-    client.ask("place", puck=CLICKED[0, :2].tolist(), velocity=[0.0, 0.0])
+    more = {"block": BLOCK[0, :2].tolist()} if info["block"] else {}
+    client.ask("place", puck=CLICKED[0, :2].tolist(), velocity=[0.0, 0.0], **more)
     time.sleep(0.2)
     with Camera(open_source(source)) as camera:
         frames = _take(camera, PICTURES)
     view = view_from_tags(_steady_tags(frames), known, lab_view(table).lens)
     # A person would click the puck, and a visible part of the paddle.
-    x, y = view.project(CLICKED)[0]
+    (x, y), (p, q) = view.project(np.concatenate([CLICKED, BLOCK]))
     u, v = _most_coloured(frames[-1].image, view.project(_rim(client)))
     touched = (survey[name] for name in ("places", "touched", "tool"))
     return Rig(
@@ -77,6 +80,11 @@ def calibrate_lab(client: LabClient) -> Rig:
         view=view,
         puck=Colour.around(frames[-1].image, (float(x), float(y))),
         puck_marked=info["marked"],
+        block=(
+            Colour.around(frames[-1].image, (float(p), float(q)))
+            if info["block"]
+            else None
+        ),
         paddle=Colour.around(frames[-1].image, (float(u), float(v)), REACH),
         robot=info["host"],
         mounting=fit_mounting(*(np.array(x) for x in touched)),

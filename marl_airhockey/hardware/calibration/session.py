@@ -20,6 +20,7 @@ from marl_airhockey.hardware.camera import Camera
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot.mounting import Mounting, fit_mounting
 from marl_airhockey.hardware.vision import Colour, Detector
+from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
@@ -34,6 +35,7 @@ class Found(FoundByCamera):
     """Results of a table's calibration so far."""
 
     puck: Colour | None = None
+    block: Colour | None = None
     places: list[Array] = field(default_factory=list)
     """Positions (2,) of the paddle on the table, table frame, m."""
     poses: list[Array] = field(default_factory=list)
@@ -69,6 +71,7 @@ class CalibrationSession(CameraSession):
         self.found: Found = Found()
         self.orders |= {
             "puck": self.click_puck,
+            "block": self.click_block,
             "touch": self.touch,
             "robot": self.solve_robot,
         }
@@ -76,6 +79,10 @@ class CalibrationSession(CameraSession):
     def click_puck(self, x: float, y: float) -> None:
         """Take the puck's colour from a clicked pixel."""
         self.found.puck = Colour.around(self._frame().image, (x, y))
+
+    def click_block(self, x: float, y: float) -> None:
+        """Take the block's colour from a clicked pixel."""
+        self.found.block = Colour.around(self._frame().image, (x, y))
 
     def touch(self) -> None:
         """Add the paddle's position, seen by the camera and reported by the arm.
@@ -129,6 +136,7 @@ class CalibrationSession(CameraSession):
             **self._rig,
             view=need(found.view, "the table"),
             puck=need(found.puck, "the puck's colour"),
+            block=found.block,
             paddle=found.paddle,
             mounting=need(found.mounting, "the robot"),
             tags={str(k): four.tolist() for k, four in found.tags.items()},
@@ -142,6 +150,7 @@ class CalibrationSession(CameraSession):
             **super().state(),
             "kind": "table",
             "puck": found.puck and found.puck.hue,
+            "block": found.block and found.block.hue,
             "touches": len(found.places),
             "touches_needed": TOUCHES,
             "robot": fit and round(1e3 * fit.residual, 2),
@@ -149,6 +158,12 @@ class CalibrationSession(CameraSession):
         }
 
     def _detectors(self) -> list[Detector]:
-        puck, radius = self.found.puck, self._table.puck_radius
-        own = [] if puck is None else [self._detector(puck, radius, 0.003)]
+        sizes = (self._table.puck_radius, Scene.block_radius)
+        own = [
+            self._detector(colour, radius, 0.003)
+            for colour, radius in zip(
+                (self.found.puck, self.found.block), sizes, strict=True
+            )
+            if colour is not None
+        ]
         return own + super()._detectors()

@@ -133,6 +133,7 @@ class Lab:
             "camera": self.camera_port,
             "table": self.setup.table,
             "marked": self.setup.marked,
+            "block": self.setup.block,
             "pids": [process.pid for process in self._processes],
         }
 

@@ -39,6 +39,8 @@ class LabSetup:
     """Name of the backend that moves puck and paddle."""
     marked: bool = False
     """True for a puck with a mark, see `vision.mark`."""
+    block: bool = False
+    """True for a block on the table, next to the puck."""
     latency: float = 0.028
     """Time from the middle of an exposure until the frame is sent, s: half of the
     exposure, the readout and the transfer."""

@@ -19,15 +19,16 @@ from marl_airhockey.hardware.lab.camera import (
 from marl_airhockey.hardware.lab.drawing import draw_polygon, fill, paste_tag, shade
 from marl_airhockey.hardware.vision.lens import CameraView, Lens
 from marl_airhockey.hardware.vision.mark import LENGTH, WIDTH
+from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
-PUCK, ARM, MARK = (42, 40, 205), (96, 92, 90), (25, 25, 25)
+PUCK, ARM, MARK, BLOCK = (42, 40, 205), (96, 92, 90), (25, 25, 25), (190, 90, 30)
 """Colours: blue, green, red."""
 TAGS_BESIDE = 0.075
 """Distance of the tags' centres from the table's edge, m."""
 PUCK_HEIGHT = 0.003
-"""Height of a puck's rim, m."""
+"""Height of the rim of a puck or a block, m."""
 ARM_HEIGHTS = np.array([0.10, 0.10, 0.35, 0.35])
 """Heights of the corners of the arm's last link above the table, m."""
 
@@ -69,6 +70,8 @@ class Seen:
     """Orientation of the puck, rad."""
     puck_spin: float = 0.0
     """Angular velocity of the puck, rad/s."""
+    block: tuple[Array, Array] | None = None
+    """Position, m, and velocity, m/s, (2,) of the block; None without one."""
 
 
 class TableCamera(LabCamera[Seen]):
@@ -114,10 +117,14 @@ class TableCamera(LabCamera[Seen]):
         view, radius = self.view, self._table.puck_radius
         paddle = seen.paddle + later * seen.paddle_velocity
         moved = None if seen.puck is None else seen.puck + later * seen.puck_velocity
-        for puck in (self.left, moved):
-            if puck is not None:
-                shade(part, view, puck + SHADOW + radius * CIRCLE, corner)
-                fill(part, view, puck + radius * CIRCLE, PUCK_HEIGHT, PUCK, corner)
+        discs = [(puck, radius, PUCK) for puck in (self.left, moved)]
+        if seen.block is not None:
+            place, velocity = seen.block
+            discs.insert(0, (place + later * velocity, Scene.block_radius, BLOCK))
+        for at, wide, colour in discs:
+            if at is not None:
+                shade(part, view, at + SHADOW + wide * CIRCLE, corner)
+                fill(part, view, at + wide * CIRCLE, PUCK_HEIGHT, colour, corner)
         if moved is not None and self._marked:
             bar = moved + _bar(radius, seen.puck_angle + later * seen.puck_spin)
             fill(part, view, bar, PUCK_HEIGHT, MARK, corner)
@@ -135,14 +142,16 @@ class TableCamera(LabCamera[Seen]):
             self.view.project(np.column_stack([link, ARM_HEIGHTS])),
             self._disc(seen.paddle, table.paddle_radius),
         ]
-        for puck in (self.left, seen.puck):
+        block = None if seen.block is None else seen.block[0]
+        for puck in (self.left, seen.puck, block):
             if puck is not None:
                 found.insert(0, self._disc(puck, table.paddle_radius))
         return found
 
     def _speed(self, seen: Seen) -> float:
-        both = seen.puck_velocity, seen.paddle_velocity
-        return max(float(np.linalg.norm(velocity)) for velocity in both)
+        moving = [seen.puck_velocity, seen.paddle_velocity]
+        moving += [] if seen.block is None else [seen.block[1]]
+        return max(float(np.linalg.norm(velocity)) for velocity in moving)
 
 
 def _bar(radius: float, angle: float) -> Array:

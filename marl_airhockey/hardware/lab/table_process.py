@@ -127,7 +127,7 @@ class TableLoop:
         moving = np.zeros(2) if world.held else world.puck_velocity
         puck = world.puck if world.present else None
         rotation = world.puck_angle, 0.0 if world.held else world.puck_spin
-        seen = Seen(puck, moving, paddle, velocity, *rotation)
+        seen = Seen(puck, moving, paddle, velocity, *rotation, world.block)
         self._frames += 1
         again = self._stuck or (self._repeats and self._frames % 2)
         if not (again and self._image.size):
@@ -140,7 +140,8 @@ class TableLoop:
         what = order["do"]
         if what == "place":
             position, velocity = np.array(order["puck"]), np.array(order["velocity"])
-            world.put(position, velocity, held=True)
+            block = np.array(order["block"]) if "block" in order else None
+            world.put(position, velocity, held=True, block=block)
             self._on.discard("lost_puck")
         elif what == "release":
             world.release()
@@ -158,6 +159,7 @@ class TableLoop:
             "paddle": self._paddle_state,
             "puck": world.puck.tolist(),
             "velocity": world.puck_velocity.tolist(),
+            "block": None if world.block is None else world.block[0].tolist(),
             "faults": sorted(self._on),
             "laws": {name: float(value[0]) for name, value in world.laws.items()},
         }

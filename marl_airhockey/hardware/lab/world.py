@@ -17,12 +17,14 @@ from marl_airhockey.types import Array
 
 RATE = 120.0
 """Number of steps per second."""
+BLOCK = np.array([0.5, 0.25])
+"""First position (2,) of the block, table frame, m."""
 NEAR = 0.004
 """Height above the table below which the paddle touches pucks, m."""
 
 
 class LabWorld:
-    """World with one puck and a paddle that the arm moves.
+    """World with one puck, a paddle that the arm moves, and a block if there is one.
 
     Args:
         setup: Setup of the lab.
@@ -31,7 +33,8 @@ class LabWorld:
     """
 
     def __init__(self, setup: LabSetup, seed: int = 0) -> None:
-        self.scene = Scene(setup.geometry, (setup.seat,), pucks=1)
+        blocks = int(setup.block)
+        self.scene = Scene(setup.geometry, (setup.seat,), pucks=1, blocks=blocks)
         self._backend = simulated_backend(setup.plant)(self.scene, 1, 1.0 / RATE)
         arms = not self._backend.tracks_commands
         physics = Physics(self.scene.defaults, "ur5e", arms=arms)
@@ -43,6 +46,7 @@ class LabWorld:
         self._backend.set_physics(self.laws, rows)
         state = self.scene.still_state(1)
         state.paddle[0, 0] = setup.home
+        state.block[0] = BLOCK
         self._paddle = np.array(setup.home)
         self._state = self._begin(state)
         self.held = True
@@ -83,17 +87,36 @@ class LabWorld:
         """Angular velocity of the puck, rad/s."""
         return float(self._state.spin[0, self.scene.bodies.puck][0])
 
-    def put(self, place: Array, velocity: Array, held: bool) -> None:
+    @property
+    def block(self) -> tuple[Array, Array] | None:
+        """Position, m, and velocity, m/s, (2,) of the block; None without one."""
+        if not self.scene.blocks:
+            return None
+        state = self._state
+        return state.block[0, 0].copy(), state.block_velocity[0, 0].copy()
+
+    def put(
+        self, place: Array, velocity: Array, held: bool, block: Array | None = None
+    ) -> None:
         """Put the puck on the table.
 
         Args:
             place: Position (2,), table frame, m.
             velocity: Velocity (2,) after the release, table frame, m/s.
             held: True to hold the puck until `release`.
+            block: New position (2,) of the block, m; None if it is not moved.
+
+        Raises:
+            ValueError: There is no block.
         """
+        if block is not None and not self.scene.blocks:
+            raise ValueError("this lab has no block: start one with --block")
         position, moving = self._state.position.copy(), self._state.velocity.copy()
         puck = self.scene.bodies.puck
         position[0, puck], moving[0, puck] = place, velocity
+        if block is not None:
+            position[0, self.scene.bodies.block] = block
+            moving[0, self.scene.bodies.block] = 0.0
         spin = np.zeros_like(self._state.spin)
         self._state = self._begin(
             replace(self._state, position=position, velocity=moving, spin=spin)

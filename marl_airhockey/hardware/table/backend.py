@@ -14,6 +14,7 @@ from marl_airhockey.hardware.camera import Camera
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot import DriverState, Robot, RobotError
 from marl_airhockey.hardware.robot.supervisor import LATCHED
+from marl_airhockey.hardware.table.block_tracker import BlockTracker
 from marl_airhockey.hardware.table.devices import TableDevices
 from marl_airhockey.hardware.table.placing import Placing
 from marl_airhockey.hardware.table.tracker import Tracker
@@ -69,6 +70,7 @@ class RealBackend(LiveBackend):
     ) -> None:
         super().__init__(scene, 1, control_dt)
         self._devices, self._tracker = devices, tracker
+        self._block = BlockTracker()
         self.placing = Placing(devices, scene)
         self._reason = ""
         self._due = 0.0
@@ -86,8 +88,10 @@ class RealBackend(LiveBackend):
                 "the real table has one arm, and people must stay out of its "
                 "workspace; play games for more seats in simulation"
             )
-        if scene.blocks or scene.obstacles:
-            return "there are no blocks on the real table; use a simulation"
+        if scene.blocks > 1 or scene.obstacles:
+            return "the real table has one block and no obstacles; use a simulation"
+        if scene.blocks and scene.block_shape != "disc":
+            return "the block of the real table is a disc; use shape=disc"
         if scene.pucks > 1:
             return f"there is one puck on the real table, not {scene.pucks}"
         if scene.physics.get("tilt") == 0.0:
@@ -151,6 +155,8 @@ class RealBackend(LiveBackend):
         begun = self.scene.still_state(1)
         if seen:
             self._tracker.begin(seen)
+        if self.placing.seen_block is not None:
+            self._block.begin(self.placing.seen_block)
         self._fill(begun, self._began, self._began)
         begun.time[:] = 0.0
         return begun
@@ -239,6 +245,8 @@ class RealBackend(LiveBackend):
         if self.scene.pucks:
             seen = self._devices.watcher.take()
             self._tracker.fill(state, seen, self.robot.track, now, since)
+        if self._devices.block_watcher is not None:
+            self._block.fill(state, self._devices.block_watcher.take())
 
     def sight(self) -> Array:
         return self._tracker.sight(self._devices.watcher.looked_at)

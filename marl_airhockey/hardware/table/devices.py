@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import replace
 
 import numpy as np
 
@@ -41,6 +42,11 @@ class TableDevices:
                 f"the scenario's table is not the rig's {rig.table!r}; pass "
                 f'options={{"table": "{rig.table}"}} or --option table={rig.table}'
             )
+        if scene.blocks and rig.block is None:
+            raise ValueError(
+                "the rig has no block: click one in airhockey calibrate, or start a "
+                "lab that has one, airhockey lab --block"
+            )
         self.rig = rig
         config = rig.robot_config(scene.seats[0].reach)
         half = tuple(float(x) for x in table.size / 2)
@@ -57,9 +63,17 @@ class TableDevices:
             )
             self._check_camera()
             if scene.pucks:
-                self._check_pucks(detector)
+                self._check_alone("puck", detector)
+                self._check_mark(detector)
             self.watcher = Watcher(self.camera, detector)
             stack.callback(self.watcher.close)
+            self.block_watcher: Watcher | None = None
+            if scene.blocks and rig.block is not None:
+                size = scene.block_radius
+                block = replace(detector, colour=rig.block, radius=size, marked=False)
+                self._check_alone("block", block)
+                self.block_watcher = Watcher(self.camera, block)
+                stack.callback(self.block_watcher.close)
             self.robot = stack.enter_context(Robot(config))
             self._open = stack.pop_all()
 
@@ -73,16 +87,21 @@ class TableDevices:
         if trouble:
             raise RuntimeError(f"camera {self.rig.camera}: {trouble}")
 
-    def _check_pucks(self, detector: Detector) -> None:
-        """Check that not several objects on the table have the puck's colour."""
+    def _check_alone(self, body: str, detector: Detector) -> None:
+        """Check that not several objects on the table have the colour of a body."""
         frame = self.camera.newest
         assert frame is not None
         found = [np.round(seen.place, 2).tolist() for seen in detector.find_all(frame)]
         if len(found) > 1:
             raise RuntimeError(
-                f"camera: {len(found)} objects have the puck's colour and size, at "
-                f"{found} m; leave one puck on the table, or calibrate another colour"
+                f"camera: {len(found)} objects have the {body}'s colour and size, at "
+                f"{found} m; leave one {body} on the table, or calibrate another colour"
             )
+
+    def _check_mark(self, detector: Detector) -> None:
+        """Check that a puck shows the mark that its rig states."""
+        frame = self.camera.newest
+        assert frame is not None
         seen = detector.find(frame)
         if detector.marked and seen is not None and np.isnan(seen.angle):
             raise RuntimeError(

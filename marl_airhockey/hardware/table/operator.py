@@ -27,12 +27,13 @@ class Operator(Protocol):
             motion: Text for a person: where the arm may move and how fast.
         """
 
-    def place(self, puck: Array, velocity: Array) -> None:
+    def place(self, puck: Array, velocity: Array, block: Array | None) -> None:
         """Put the puck at its start position and hold it there.
 
         Args:
             puck: Start position (2,), table frame, m.
             velocity: Velocity (2,) at the release, table frame, m/s.
+            block: Start position (2,) of the block, m; None without one.
 
         Raises:
             RuntimeError: The operator does not place the puck.
@@ -78,8 +79,9 @@ class LabOperator:
     def begin(self, motion: str) -> None:
         """Return immediately: there are no people in the virtual lab."""
 
-    def place(self, puck: Array, velocity: Array) -> None:
-        self._ask(do="place", puck=puck.tolist(), velocity=velocity.tolist())
+    def place(self, puck: Array, velocity: Array, block: Array | None) -> None:
+        more = {} if block is None else {"block": block.tolist()}
+        self._ask(do="place", puck=puck.tolist(), velocity=velocity.tolist(), **more)
 
     def release(self) -> None:
         self._ask(do="release")
@@ -104,11 +106,12 @@ class PersonOperator:
             "device?"
         )
 
-    def place(self, puck: Array, velocity: Array) -> None:
+    def place(self, puck: Array, velocity: Array, block: Array | None) -> None:
+        aside = "" if block is None else f"Put the block at {_where(block)}. "
         self._ask(
-            f"Put the puck at x = {puck[0]:+.2f} m, y = {puck[1]:+.2f} m (from the "
-            "table's centre; x points away from the robot, y to its left), hold it "
-            "there, and take the enabling device."
+            f"{aside}Put the puck at {_where(puck)} (from the table's centre; x points "
+            "away from the robot, y to its left), hold it there, and take the enabling "
+            "device."
         )
 
     def release(self) -> None:
@@ -116,6 +119,10 @@ class PersonOperator:
 
     def allow(self, stop: str) -> None:
         self._ask(_stopped(stop))
+
+
+def _where(place: Array) -> str:
+    return f"x = {place[0]:+.2f} m, y = {place[1]:+.2f} m"
 
 
 def _stopped(why: str) -> str:

@@ -10,6 +10,7 @@ from marl_airhockey.hardware.robot import DriverState, Fault
 from marl_airhockey.hardware.table.devices import TableDevices
 from marl_airhockey.hardware.table.operator import make_operator
 from marl_airhockey.hardware.vision import Sighting
+from marl_airhockey.hardware.vision.watcher import Watcher
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array
@@ -37,6 +38,8 @@ class Placing:
         self.operator = make_operator(devices.rig.operator)
         """Operator, who places the puck and allows the arm to move."""
         self._allowed = False
+        self.seen_block: Sighting | None = None
+        """Sighting of the placed block; None without one."""
 
     def place(self, state: State) -> list[Sighting]:
         """Set up the state in which an episode begins. Afterwards the robot is ready.
@@ -45,11 +48,12 @@ class Placing:
             state: State of one world, with arrays (1, ...).
 
         Returns:
-            First sightings of the puck after its release; none without a puck.
+            First sightings of the puck after its release; none without a puck. Those
+            of the block are in `seen_block`.
 
         Raises:
             RobotError: The robot does not recover, or does not reach its position.
-            RuntimeError: The puck is not seen, or not at its start position.
+            RuntimeError: Puck or block is not seen, or not at its start position.
         """
         robot = self._devices.robot
         if not self._allowed:
@@ -61,8 +65,14 @@ class Placing:
         if not self._scene.pucks:
             return []
         target, velocity = state.puck[0, 0], state.puck_velocity[0, 0]
-        self.operator.place(target, velocity)
-        self._await_puck(target)
+        watcher, block = self._devices.block_watcher, None
+        if watcher is not None:
+            block = state.block[0, 0]
+        self.operator.place(target, velocity, block)
+        self._await("puck", self._devices.watcher, target)
+        if watcher is not None and block is not None:
+            self.seen_block = self._await("block", watcher, block)
+            watcher.take()
         self.operator.release()
         return self._first_sightings()
 
@@ -82,27 +92,27 @@ class Placing:
             else:
                 robot.recover()
 
-    def _await_puck(self, target: Array) -> None:
-        """Wait until the placed puck is seen near its target position (2,), m.
+    def _await(self, body: str, watcher: Watcher, target: Array) -> Sighting:
+        """Wait until a placed body is seen near its target position (2,), m.
 
         Raises:
-            RuntimeError: The puck is not seen there in time.
+            RuntimeError: The body is not seen there in time.
         """
         devices, far = self._devices, float("inf")
         began = time.monotonic()
         until = began + PLACING
         while time.monotonic() < until:
             devices.robot.send_action(np.zeros(2), 0.0)
-            last = devices.watcher.last
+            last = watcher.last
             if last is not None and last.taken > began:
                 far = float(np.linalg.norm(last.place - target))
                 if far < APART:
-                    return
+                    return last
             time.sleep(0.02)
-        trouble = devices.camera.trouble or devices.watcher.trouble
+        trouble = devices.camera.trouble or watcher.trouble
         where = "not seen" if not np.isfinite(far) else f"seen {far:.2f} m from there"
         raise RuntimeError(
-            f"the puck is {where} within {PLACING:.0f} s (target "
+            f"the {body} is {where} within {PLACING:.0f} s (target "
             f"{np.round(target, 2)} m); "
             f"{trouble or 'put it at its target'}"
         )

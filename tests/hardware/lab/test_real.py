@@ -5,6 +5,7 @@ import dataclasses
 import importlib.util
 import threading
 import time
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ import marl_airhockey as ah
 from marl_airhockey.build import build_driven_world
 from marl_airhockey.cli.main import app
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.hardware.lab.lab import LabClient
+from marl_airhockey.hardware.calibration.lab_rig import calibrate_lab
+from marl_airhockey.hardware.lab.lab import Lab, LabClient, served
+from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.registry import find_backend, make_driver
 from marl_airhockey.sim.core.errors import UnknownKeywordError
@@ -147,7 +150,8 @@ def test_what_fails_ends_the_episode_with_its_reason(lab, rig, fault, name, word
     ("task", "options", "words"),
     [
         ("duel", {}, "one arm"),
-        ("move_block", {}, "no blocks"),
+        ("move_block", {"shape": "square"}, "is a disc"),
+        ("touch", {"obstacles": [[0.2, 0.0, 0.05]]}, "obstacles"),
         ("strike", {}, "tilted"),
         ("juggle", {"pucks": 2}, "one puck"),
     ],
@@ -157,7 +161,24 @@ def test_what_is_not_on_the_table_is_refused_in_words(task, options, words):
     assert words in find_backend("real").supports(scene)
 
 
+@pytest.mark.slow
+def test_a_block_is_seen_where_it_is(tmp_path):
+    with Lab(LabSetup(block=True)) as lab, served(lab, announce=False) as port:
+        with closing(LabClient(port)) as client:
+            calibrate_lab(client).save(tmp_path / "rig.json")
+        settings = keywords(tmp_path / "rig.json")
+        world = build_driven_world(make_driver("still"), "move_block", 1, settings)
+        with closing(world):
+            world.reset(3)
+            for _ in range(20):
+                world.step(np.zeros((1, 0, 2)))
+                block = lab.ask({"do": "truth"})["block"]
+                assert np.abs(world.state.block[0, 0] - block).max() < 0.003
+
+
 def test_another_table_no_rig_and_a_wild_driver_are_refused(rig):
+    with pytest.raises(ValueError, match="no block"):
+        ah.parallel_env("move_block", **keywords(rig))
     with pytest.raises(ValueError, match="table=full_size"):
         ah.parallel_env("reach", **keywords(rig, table="standard"))
     with pytest.raises(ValueError, match="--lab"):

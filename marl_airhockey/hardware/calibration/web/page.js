@@ -15,6 +15,8 @@ const STEPS = [
     words: (s) => s.table !== null ? `Found to ${px(s.table)}; tags ${s.tags.join(", ") || "none"} are its check from now on.` : s.corners_needed ? `Click ${s.kind === "hand" ? "the corners of the field" : "where the rails meet"}, counter-clockwise as seen from above, beginning at the near ${s.kind === "hand" ? "right corner, as you see it" : "left corner as seen from the arm"}: ${s.corners} of ${s.corners_needed}. Their edges make them exact.` : "All tags must be visible." },
   { title: "Puck", done: (s) => s.puck !== null, clicks: "puck", orders: { puck: "Click the puck" },
     words: (s) => s.puck !== null ? `Hue ${s.puck} of 180; a cross marks where it is found.` : "Put it on the table and click it." },
+  { title: "Block", done: (s) => s.block !== null, clicks: "block", orders: { block: "Click the block" },
+    words: (s) => s.block !== null ? `Hue ${s.block} of 180; a cross marks where it is found.` : "Only for tasks with a block: put it on the table and click it." },
   { title: "Paddle", done: (s) => s.paddle !== null, orders: { paddle: "Click the paddle" },
     words: (s) => s.paddle !== null ? `Hue ${s.paddle} of 180.` : "Click the paddle where it is not hidden by the arm." },
   { title: "Arm", done: (s) => s.robot !== null, orders: { guide: "Guide the arm on", touch: "Take place", robot: "Find the arm" },
@@ -22,7 +24,7 @@ const STEPS = [
   { title: "File", done: (s) => s.saved !== "", orders: { save: "Save" },
     words: (s) => s.saved ? `Written: ${s.saved}` : "All of the above goes into one file." },
 ];
-const CLICKS = ["corner", "puck", "paddle"];
+const CLICKS = ["corner", "puck", "block", "paddle"];
 
 async function order(name, place = {}) {
   if (busy) return;
