@@ -59,7 +59,7 @@ test-short: setup
 	$(TEST) -m 'not slow'
 
 test-realtime: setup
-	$(BIN)/pytest -m 'not slow' --closing $(REALTIME)
+	$(BIN)/pytest -m 'not slow' --closing --durations 25 $(REALTIME)
 
 check: setup ## Run linters and tests of what has changed since main
 	$(BIN)/python scripts/check_changes.py

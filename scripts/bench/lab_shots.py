@@ -3,7 +3,7 @@
     python scripts/bench/lab_shots.py runs/hit_goal_lab runs/move_block_lab --seed 11
 
 docs/robot_results.md has the commands that fit the lab and train the policies. The lab
-has a marked puck, a block, and a camera with 60 frames/s. Each policy plays 20 episodes
+has a marked puck and a block. Each policy plays 20 episodes
 through camera and arm, in real time, and 1000 in the simulation of its training.
 Intervals are 95 %. Nothing else should run at the same time. Policies whose row is in
 the file are not measured again.
@@ -29,8 +29,6 @@ from marl_airhockey.sim.jit.folders import cache_folder
 from marl_airhockey.sim.world.keywords import Keywords
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
-FRAME_RATE = 60.0
-"""Frame rate of the camera, 1/s, that the profile assumes."""
 
 
 def measure(run: Path, rig: Path) -> dict[str, str]:
@@ -67,7 +65,7 @@ def main(
             rows = list(csv.DictReader(file))
     known = {row["task"] for row in rows}
     setup = LabSetup(marked=True, block=True)
-    with Lab(setup, seed, FRAME_RATE) as lab, served(lab, announce=False) as port:
+    with Lab(setup, seed) as lab, served(lab, announce=False) as port:
         path = cache_folder() / f"shots-{port}.json"
         with closing(LabClient(port)) as client:
             calibrate_lab(client).save(path)

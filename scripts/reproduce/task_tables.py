@@ -108,12 +108,13 @@ def cost_of(task: str, profile: str, rows: Rows) -> Row:
 
 
 def tables_of(profile: str) -> Tables:
-    """Return the tables of a profile."""
+    """Return the tables of a profile, with the tasks that have rows."""
     rows, blind = read(DATA / "tasks.csv"), read(DATA / "blind.csv")
+    tasks = [task for task in TASKS if of(rows, task, profile)]
     return {
-        "Success": [success_of(task, profile, rows, blind) for task in TASKS],
-        "Other conditions": [conditions_of(task, profile, rows) for task in TASKS],
-        "Cost": [cost_of(task, profile, rows) for task in TASKS],
+        "Success": [success_of(task, profile, rows, blind) for task in tasks],
+        "Other conditions": [conditions_of(task, profile, rows) for task in tasks],
+        "Cost": [cost_of(task, profile, rows) for task in tasks],
     }
 
 
@@ -132,7 +133,7 @@ def curves_of(points: Rows, task: str, profile: str) -> list[Rows]:
 
 def main(
     profile: Annotated[
-        str, typer.Option(help="Name of the profile: ideal, ur5e or gantry.")
+        str, typer.Option(help="Name of the profile, such as ur5e.")
     ] = "ideal",
     markdown: Annotated[
         Path | None, typer.Option(help="Markdown file of the tables.")

@@ -1,7 +1,7 @@
 """Train every task with its preset over several seeds and save the rows.
 
     python scripts/reproduce/tasks.py --seeds 5 --jobs 2
-    python scripts/reproduce/tasks.py --profile ur5e --seeds 5 --jobs 2
+    python scripts/reproduce/tasks.py --profile ur5e --seeds 3 --jobs 2
     python scripts/reproduce/tasks.py --profile ur5e --variant truth --seeds 2
     python scripts/reproduce/tasks.py --profile ur5e --variant 60hz --tasks juggle
 
@@ -172,7 +172,7 @@ def main(
     ] = ",".join(TASKS),
     seeds: Annotated[int, typer.Option(help="Number of seeds, from 0.")] = 5,
     profile: Annotated[
-        str, typer.Option(help="Name of the profile: ideal, ur5e or gantry.")
+        str, typer.Option(help="Name of the profile, such as ur5e.")
     ] = "ideal",
     variant: Annotated[
         str, typer.Option(help="Name of the variant: truth, 60hz, or none by default.")

@@ -355,6 +355,16 @@ def test_tasks_through_the_lab_are_those_of_their_rows():
             assert line[title] == row[column]
 
 
+def test_shots_in_a_fitted_lab_are_those_of_their_rows():
+    rows = {row["task"]: row for row in rows_of("lab_shots.csv")}
+    shown = table("docs/robot_results.md", "first shot there")
+    assert len(shown) == len(rows)
+    columns = ("task", "lab", "first_shot", "profile", "profile_first_shot")
+    for line in shown:
+        row = rows[line["task"]]
+        assert [*line.values()] == [row[column] for column in columns]
+
+
 def test_first_starts_are_those_that_were_measured():
     found = {(row["case"], row["place"]): row for row in rows_of("first_start.csv")}
     listed = table("docs/backends.md", "first start")
