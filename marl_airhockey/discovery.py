@@ -36,3 +36,8 @@ def gymnasium_id(scenario: str) -> str:
     """Return the gymnasium id, with its version, of a scenario of this library."""
     camel = "".join(word.capitalize() for word in scenario.split("_"))
     return f"marl_airhockey/{camel}-v{version_of(scenario)}"
+
+
+def pettingzoo_id(scenario: str) -> str:
+    """Return the PettingZoo id, with its version, of a scenario of this library."""
+    return f"marl_airhockey/{scenario}-v{version_of(scenario)}"

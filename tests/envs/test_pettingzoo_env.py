@@ -4,15 +4,35 @@ import importlib
 
 import gymnasium
 import numpy as np
+import pettingzoo
 import pytest
 from pair import Pair
 from pettingzoo.test import max_cycles_test, parallel_api_test
 
 import marl_airhockey as ah
+from marl_airhockey.discovery import pettingzoo_id
 
 
 def test_two_open_seats_pass_pettingzoos_test():
     parallel_api_test(ah.parallel_env(Pair()), num_cycles=400)
+
+
+@pytest.mark.parametrize("kind", ["parallel", "aec"])
+def test_every_scenario_is_in_pettingzoos_registry(kind):
+    known = getattr(pettingzoo, f"{kind}_registry")
+    ours = {spec.name for spec in known.values() if spec.namespace == "marl_airhockey"}
+    assert ours == set(ah.scenario_names())
+    for name in ours:
+        env = pettingzoo.make(kind, pettingzoo_id(name))
+        assert env.metadata["name"] == f"{name}_v{ah.make_scenario(name).version}"
+
+
+def test_keywords_pass_through_pettingzoos_registry():
+    drivers = {"paddle_1": "striker"}
+    env = pettingzoo.make("parallel", "marl_airhockey/duel", drivers=drivers)
+    assert env.possible_agents == ["paddle_0"]
+    with pytest.raises(ValueError, match="unknown"):
+        pettingzoo.make("aec", "marl_airhockey/duel-v0", driver=drivers)
 
 
 def test_a_driven_seat_makes_it_a_single_agent_environment():
