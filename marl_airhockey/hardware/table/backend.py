@@ -289,8 +289,8 @@ class RealBackend(LiveBackend):
             return self.rectifier.rectify(frame.image, width)[..., ::-1]
         status = self.robot.get_observation()
         paddle = np.array([status.x, status.y])
-        puck = self._tracker.estimate
-        return self._devices.overlay.draw(frame.image, paddle, puck, marks, width)
+        bodies = paddle, self._tracker.estimate, self._block.place
+        return self._devices.overlay.draw(frame.image, *bodies, marks, width)
 
     def close(self) -> None:
         self._devices.close()

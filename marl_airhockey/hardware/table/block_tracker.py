@@ -6,6 +6,7 @@ import numpy as np
 
 from marl_airhockey.hardware.vision import Sighting
 from marl_airhockey.sim.core.state import State
+from marl_airhockey.types import Array
 
 REST = 0.002
 """Distance from its last position within which a block is at rest, m. Sightings differ
@@ -19,6 +20,11 @@ class BlockTracker:
         self._last: Sighting | None = None
         """Sighting with the block's position."""
         self._velocity = np.zeros(2)
+
+    @property
+    def place(self) -> Array | None:
+        """Position (2,) of the block, m; None before an episode begins."""
+        return None if self._last is None else self._last.place
 
     def begin(self, seen: Sighting) -> None:
         """Begin an episode with a block at rest."""

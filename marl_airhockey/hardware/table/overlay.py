@@ -1,9 +1,9 @@
 """Camera frame with the estimated bodies and marks drawn over it.
 
-The ring of the puck is yellow, although the palette has dark pucks: it is the estimate
-and must differ from the real puck in the frame. It can be next to that puck, because
-the estimate is of the current time and the frame is older by its latency. All lines
-have dark edges, so that they are visible on a bright table.
+The rings of puck and block are yellow, although the palette has dark pucks: they are
+estimates and must differ from the real bodies in the frame. The ring of the puck can be
+next to it, because the estimate is of the current time and the frame is older by its
+latency. All lines have dark edges, so that they are visible on a bright table.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from marl_airhockey.hardware.vision.lens import CameraView
 from marl_airhockey.sim.contracts.mark import Mark, Meaning
 from marl_airhockey.sim.contracts.palette import LIGHT, SEATS, rgb
+from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
@@ -47,6 +48,7 @@ class Overlay:
         image: Array,
         paddle: Array,
         puck: Array | None,
+        block: Array | None,
         marks: Sequence[Mark],
         width: int,
     ) -> Array:
@@ -57,6 +59,7 @@ class Overlay:
             paddle: Position (2,) of the paddle, table frame, m.
             puck: Position, m, and velocity, m/s, of the puck (4,), table frame; None
                 without a puck.
+            block: Position (2,) of the block, m; None without one.
             marks: Marks of the scenario.
             width: Width of the result, px.
         """
@@ -71,6 +74,8 @@ class Overlay:
             else:
                 self._line(drawn, np.array([mark.start, mark.end]), colour)
         self._line(drawn, paddle + table.paddle_radius * CIRCLE, PADDLE)
+        if block is not None:
+            self._line(drawn, block + Scene.block_radius * CIRCLE, PUCK)
         if puck is not None:
             self._line(drawn, puck[:2] + table.puck_radius * CIRCLE, PUCK)
             self._line(drawn, np.stack([puck[:2], puck[:2] + AHEAD * puck[2:]]), PUCK)
