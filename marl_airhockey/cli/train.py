@@ -73,6 +73,13 @@ def train(
             "(stable-baselines3), or rllib (several processes)."
         ),
     ] = None,
+    device: Annotated[
+        str | None,
+        typer.Option(
+            help="Device of torch that learns: cpu, cuda, cuda:NUMBER, or auto for a "
+            "GPU if there is one. Worlds are on the CPU. By default cpu."
+        ),
+    ] = None,
     num_env_runners: Annotated[
         int | None,
         typer.Option(
@@ -136,6 +143,7 @@ def train(
         "hidden": [hidden, hidden] if hidden is not None else None,
         "init": str(init) if init is not None else None,
         "engine": engine,
+        "device": device,
         "num_env_runners": num_env_runners,
     }
     given = {name: value for name, value in given.items() if value is not None}

@@ -185,7 +185,7 @@ def load_state(path: Path) -> dict[str, Any]:
         ValueError: The file is missing or damaged. The message names it.
     """
     try:
-        found: dict[str, Any] = torch.load(path, weights_only=True)
+        found: dict[str, Any] = torch.load(path, "cpu", weights_only=True)
     except (OSError, EOFError, RuntimeError, UnpicklingError) as error:
         raise ValueError(
             f"{path}: missing or damaged ({error}); begin the run again in another "

@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from marl_airhockey.learn.device import moved, torch_device
 from marl_airhockey.learn.engine import (
     AdaptiveRate,
     end_setup,
@@ -99,12 +100,13 @@ class Trainer:
     def __init__(self, run: TrainingRun[PPOConfig]) -> None:
         config = self._config = run.config
         self._run = run
+        self._device = torch_device(config.device)
         torch.manual_seed(config.seed)
         self._env = make_training_env(config, config.num_worlds, run.folder / "pool")
         layout = self._env.world.observer.layout
         self.model = ActorCritic(
             config.hidden, config.log_std_init, layout.centre, layout.unit
-        )
+        ).to(self._device)
         self._rate = AdaptiveRate(config, run.progress.rate or config.learning_rate)
         self._optimizer = torch.optim.Adam(
             self.model.parameters(), eps=1e-5, fused=True
@@ -150,29 +152,30 @@ class Trainer:
     def _collect(self) -> Rollout:
         """Play ``n_steps`` steps of all slots."""
         config, env, model = self._config, self._env, self.model
-        shape = config.n_steps, env.num_envs
+        shape, device = (config.n_steps, env.num_envs), self._device
+        reward, not_done = torch.empty(shape), torch.ones(shape)
         rollout = Rollout(
-            torch.empty(*shape, len(model.centre)),
-            torch.empty(*shape, 2),
-            torch.empty(shape),
-            torch.empty(shape),
-            torch.ones(shape),
+            torch.empty(*shape, len(model.centre), device=device),
+            torch.empty(*shape, 2, device=device),
+            torch.empty(shape, device=device),
+            reward,
+            not_done,
             truncated=[],
             success=[],
         )
         with torch.inference_mode():
             spread = torch.exp(model.log_std)
             for t in range(config.n_steps):
-                observation = model.scaled(torch.from_numpy(self._observation))
+                observation = model.scaled(moved(self._observation, device))
                 rollout.observation[t] = observation
                 mean = model.actor(observation)
                 action = mean + spread * torch.randn_like(mean)
                 rollout.action[t] = action
                 rollout.density[t] = model.log_density(mean, action)
-                step = env.step(action.clamp(-1.0, 1.0).numpy())
-                self._observation, reward, done, infos = step
-                rollout.reward[t] = torch.from_numpy(reward)
-                rollout.not_done[t] = torch.from_numpy(1.0 - done)
+                step = env.step(action.clamp(-1.0, 1.0).cpu().numpy())
+                self._observation, gained, done, infos = step
+                reward[t] = torch.from_numpy(gained)
+                not_done[t] = torch.from_numpy(1.0 - done)
                 ended = np.flatnonzero(done).tolist()
                 rollout.success += [infos[i]["is_success"] for i in ended]
                 rollout.truncated += [
@@ -181,6 +184,7 @@ class Trainer:
                     if infos[i]["TimeLimit.truncated"]
                 ]
                 note_step(self._log, env)
+        rollout.reward, rollout.not_done = reward.to(device), not_done.to(device)
         return rollout
 
     def _advantages(self, rollout: Rollout) -> tuple[Tensor, Tensor]:
@@ -188,11 +192,13 @@ class Trainer:
         config, model = self._config, self.model
         with torch.inference_mode():
             value = model.critic(rollout.observation)[..., 0]
-            last = model.critic(model.scaled(torch.from_numpy(self._observation)))[:, 0]
+            after = moved(self._observation, self._device)
+            last = model.critic(model.scaled(after))[:, 0]
             reward = rollout.reward
             if rollout.truncated:
                 steps, slots, seen = zip(*rollout.truncated, strict=True)
-                beyond = model.critic(model.scaled(torch.from_numpy(np.stack(seen))))
+                ends = moved(np.stack(seen), self._device)
+                beyond = model.critic(model.scaled(ends))
                 reward[list(steps), list(slots)] += config.gamma * beyond[:, 0]
             settings = config.gamma, config.gae_lambda
             advantage = generalized_advantage(
@@ -211,17 +217,18 @@ class Trainer:
             rollout.action.flatten(0, 1),
             *(x.flatten() for x in (rollout.density, advantage, returns)),
         ]
-        size, divergences = len(flat[-1]), [0.0]
+        size, divergences = len(flat[-1]), list[Tensor]()
         for _ in range(config.n_epochs):
-            order, divergences = torch.randperm(size), []
+            order, divergences = torch.randperm(size, device=self._device), []
             mixed = [x.index_select(0, order) for x in flat]
             for low in range(0, size, config.batch_size):
                 part = [x[low : low + config.batch_size] for x in mixed]
                 divergences.append(self._descend(*part))
-        self._log.record("train/approx_kl", float(np.mean(divergences)))
+        divergence = float(np.mean([float(each) for each in divergences]))
+        self._log.record("train/approx_kl", divergence)
         self._log.record("train/learning_rate", rate)
         self._log.record("train/std", float(self.model.log_std.detach().exp().mean()))
-        return float(np.mean(divergences))
+        return divergence
 
     def _descend(
         self,
@@ -230,7 +237,7 @@ class Trainer:
         density: Tensor,
         advantage: Tensor,
         returns: Tensor,
-    ) -> float:
+    ) -> Tensor:
         """Make one gradient step on a minibatch; return its KL divergence."""
         model, clip = self.model, self._config.clip_range
         change = model.log_density(model.actor(observation), action) - density
@@ -245,7 +252,7 @@ class Trainer:
         loss.backward()  # type: ignore[no-untyped-call]
         nn.utils.clip_grad_norm_(model.parameters(), self._config.max_grad_norm)
         self._optimizer.step()
-        return float((ratio.detach() - 1.0 - change.detach()).mean())
+        return (ratio.detach() - 1.0 - change.detach()).mean()
 
     def _policy(self) -> NumpyPolicy:
         card = self._config.card(self._env.world.observer.layout.labels)

@@ -93,6 +93,8 @@ class PPOConfig(SelfPlayConfig):
         return observe == "pixels" or options.get("goals") == "dict"
 
     def _check_rllib(self) -> None:
+        if self.device != "cpu":
+            raise ValueError(f"device: {self.device!r}; rllib learns on the cpu here")
         if self.init:
             raise ValueError("init: rllib cannot begin with the weights of a run")
         runners = self.num_env_runners

@@ -62,6 +62,9 @@ class RunConfig:
     0."""
     torch_threads: int = 1
     """Number of threads of torch, above 0."""
+    device: str = "cpu"
+    """Device of torch that learns: "cpu", "cuda", "cuda:NUMBER", or "auto" for a GPU if
+    there is one. Worlds and evaluations are on the CPU."""
 
     def __post_init__(self) -> None:
         check_fields(self)

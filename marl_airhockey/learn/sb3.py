@@ -14,6 +14,7 @@ from stable_baselines3.common.utils import ConstantSchedule
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.envs.slots import SlotEnv
+from marl_airhockey.learn.device import torch_device
 from marl_airhockey.learn.engine import (
     AdaptiveRate,
     end_setup,
@@ -58,7 +59,9 @@ class SB3Trainer:
         self._rate = AdaptiveRate(config, run.progress.rate or config.learning_rate)
         self._env = AirHockeyVecEnv(self._slots)
         if steps:
-            self._model = PPO.load(folder / "last.zip", self._env, device="cpu")
+            self._model = PPO.load(
+                folder / "last.zip", self._env, device=torch_device(config.device)
+            )
         else:
             self._model = build_model(config, self._env)
             if config.init:
@@ -189,7 +192,7 @@ def build_model(config: PPOConfig, env: AirHockeyVecEnv) -> PPO:
         ent_coef=config.ent_coef,
         max_grad_norm=config.max_grad_norm,
         seed=config.seed,
-        device="cpu",
+        device=torch_device(config.device),
         policy_kwargs={
             "net_arch": {"pi": config.hidden, "vf": config.hidden},
             "activation_fn": torch.nn.ReLU,

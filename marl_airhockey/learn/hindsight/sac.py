@@ -16,6 +16,7 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.envs.slots import SlotEnv
+from marl_airhockey.learn.device import torch_device
 from marl_airhockey.learn.engine import (
     evaluate_and_record,
     load_state,
@@ -64,7 +65,7 @@ class HindsightTrainer:
         self.model = build_model(config, self._env)
         if steps:
             known = load_state(run.folder / "last.pt")
-            self.model.set_parameters(known["model"], device="cpu")
+            self.model.set_parameters(known["model"], device=self.model.device)
             with torch.no_grad():
                 _entropy(self.model).copy_(known["entropy"])
             self.model.num_timesteps = steps
@@ -158,7 +159,7 @@ def build_model(config: HindsightConfig, env: AirHockeyVecEnv) -> OffPolicyAlgor
         replay_buffer_class=BUFFERS[config.ends],
         replay_buffer_kwargs={"n_sampled_goal": config.relabelled},
         seed=config.seed,
-        device="cpu",
+        device=torch_device(config.device),
         policy_kwargs={
             "net_arch": config.hidden,
             "features_extractor_class": FixedScale,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -55,9 +55,13 @@ class Dataset:
     def __len__(self) -> int:
         return len(self.steps.action)
 
+    def to(self, device: torch.device) -> Dataset:
+        """Return the dataset on a device."""
+        return replace(self, steps=StepBatch(*(x.to(device) for x in self.steps)))
+
     def sample(self, count: int) -> StepBatch:
         """Return ``count`` steps, sampled with replacement."""
-        rows = torch.randint(len(self), (count,))
+        rows = torch.randint(len(self), (count,), device=self.steps.action.device)
         return StepBatch(*(x.index_select(0, rows) for x in self.steps))
 
 

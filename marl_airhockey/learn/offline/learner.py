@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from marl_airhockey.build import build_world
+from marl_airhockey.learn.device import torch_device
 from marl_airhockey.learn.engine import (
     evaluate_and_record,
     load_state,
@@ -62,13 +63,14 @@ class Learner:
         self._card = config.card(layout.labels)
         files = [Path(path) for path in config.data]
         shape = config.seat, config.share, config.gamma, len(centre)
-        self._data = load_dataset(files, *shape)
+        device = torch_device(config.device)
+        self._data = load_dataset(files, *shape).to(device)
         # A resumed run samples other steps than those of its beginning.
         torch.manual_seed(config.seed * 10_000 + run.progress.steps % 9973)
         make: Callable[[OfflineConfig, object, object], Algorithm] = import_module(
             f"marl_airhockey.learn.offline.{config.algo}"
         ).make
-        self.model = make(config, centre, unit)
+        self.model = make(config, centre, unit).to(device)
         learned = [p for p in self.model.parameters() if p.requires_grad]
         self._optimizer = torch.optim.Adam(learned, config.learning_rate, fused=True)
         if run.progress.steps:

@@ -15,6 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from marl_airhockey.data.reader import episodes_of
+from marl_airhockey.learn.device import torch_device
 from marl_airhockey.learn.engine import (
     evaluate_and_record,
     load_state,
@@ -55,7 +56,7 @@ class PixelSteps(NamedTuple):
 
     def sample(self, count: int) -> tuple[Tensor, Tensor]:
         """Return images (n, PIXELS, PIXELS, FRAMES) and actions (n, 2)."""
-        rows = torch.randint(len(self.action), (count,))
+        rows = torch.randint(len(self.action), (count,), device=self.action.device)
         pictures = self.frames[self.shown[rows]].permute(0, 2, 3, 1)
         return pictures, self.action[rows]
 
@@ -140,7 +141,8 @@ class PixelActor(nn.Module):
         def predict(observation: Any, deterministic: bool) -> Array:
             with torch.inference_mode():
                 rows = torch.from_numpy(np.asarray(observation, np.float32))
-                return np.asarray(self(rows).numpy())
+                device = next(self.parameters()).device
+                return np.asarray(self(rows.to(device)).cpu().numpy())
 
         shape = PIXELS, PIXELS, FRAMES
         return Policy(predict, shape, "pixels", "training", can_sample=False)
@@ -154,7 +156,7 @@ class PixelActor(nn.Module):
             if not isinstance(layer, (nn.Conv2d, nn.Linear)):
                 x = graph.node({nn.ReLU: "Relu", nn.Flatten: "Flatten"}[type(layer)], x)
                 continue
-            state = {k: v.numpy() for k, v in layer.state_dict().items()}
+            state = {k: v.cpu().numpy() for k, v in layer.state_dict().items()}
             arrays = [graph.constant(f"{k}_{i}", array) for k, array in state.items()]
             if isinstance(layer, nn.Conv2d):
                 x = graph.node("Conv", x, *arrays, strides=list(layer.stride))
@@ -175,10 +177,12 @@ class PixelCloning:
         self._run = run
         scene = find_scenario(config.scenario, **config.options).scene
         files = [Path(path) for path in config.data]
-        self._data = render_pictures(files, scene, config.seat, config.share)
+        device = torch_device(config.device)
+        rendered = render_pictures(files, scene, config.seat, config.share)
+        self._data = PixelSteps(*(x.to(device) for x in rendered))
         # A resumed run samples other steps than those of its beginning.
         torch.manual_seed(config.seed * 10_000 + run.progress.steps % 9973)
-        self.model = PixelActor(config.hidden)
+        self.model = PixelActor(config.hidden).to(device)
         self._optimizer = torch.optim.Adam(self.model.parameters(), fused=True)
         if run.progress.steps:
             state = load_state(run.folder / "last.pt")
