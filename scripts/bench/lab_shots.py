@@ -11,13 +11,12 @@ the file are not measured again.
 
 from __future__ import annotations
 
-import csv
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from lab_tasks import EPISODES, SIMULATED, shown
+from lab_tasks import EPISODES, SIMULATED, add, read, shown
 
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.hardware.calibration.lab_rig import calibrate_lab
@@ -59,10 +58,7 @@ def main(
     out: Annotated[Path, typer.Option(help="CSV file.")] = DATA / "lab_shots.csv",
 ) -> None:
     """Measure and print."""
-    rows: list[dict[str, str]] = []
-    if out.exists():
-        with out.open() as file:
-            rows = list(csv.DictReader(file))
+    rows = read(out)
     known = {row["task"] for row in rows}
     setup = LabSetup(marked=True, block=True)
     with Lab(setup, seed) as lab, served(lab, announce=False) as port:
@@ -72,12 +68,7 @@ def main(
         for run in runs:
             if load_config(PPOConfig, run / "config.toml").scenario in known:
                 continue
-            rows.append(measure(run, path))
-            print(rows[-1], flush=True)
-            with out.open("w", newline="") as file:
-                table = csv.DictWriter(file, [*rows[0]], lineterminator="\n")
-                table.writeheader()
-                table.writerows(rows)
+            add(rows, measure(run, path), out)
         path.unlink()
 
 

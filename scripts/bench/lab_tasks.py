@@ -36,6 +36,24 @@ def shown(result: EvaluationResult, digits: int) -> str:
     return f"{result.success:.{digits}f} ({low:.{digits}f} .. {high:.{digits}f})"
 
 
+def read(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a CSV file; none if there is no file."""
+    if not path.exists():
+        return []
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def add(rows: list[dict[str, str]], row: dict[str, str], path: Path) -> None:
+    """Add a row, print it, and write all rows into a CSV file."""
+    rows.append(row)
+    print(row, flush=True)
+    with path.open("w", newline="") as file:
+        table = csv.DictWriter(file, [*row], lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+
+
 def measure(task: str, rig: Path, physics: dict[str, float]) -> dict[str, str]:
     """Return the row of a task.
 
@@ -71,10 +89,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--out", type=Path, required=True, help="CSV file of the rows.")
     out = parser.parse_args().out
-    rows: list[dict[str, str]] = []
-    if out.exists():
-        with out.open() as file:
-            rows = list(csv.DictReader(file))
+    rows = read(out)
     known = {row["task"] for row in rows}
     with Lab() as lab, served(lab, announce=False) as port:
         path = cache_folder() / f"tasks-{port}.json"
@@ -84,12 +99,7 @@ def main() -> None:
         for task in TASKS:
             if task in known:
                 continue
-            rows.append(measure(task, path, physics))
-            print(rows[-1], flush=True)
-            with out.open("w", newline="") as file:
-                table = csv.DictWriter(file, [*rows[0]], lineterminator="\n")
-                table.writeheader()
-                table.writerows(rows)
+            add(rows, measure(task, path, physics), out)
         path.unlink()
 
 

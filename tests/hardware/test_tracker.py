@@ -117,7 +117,7 @@ def test_a_path_without_a_new_frame_is_a_point(colour):
 
 
 def test_a_block_rests_until_it_is_hit_and_then_follows():
-    """Of the images of a puck that flies at a block."""
+    """Track a block on the images of a puck that flies at it."""
     setup = LabSetup(block=True)
     world, start = LabWorld(setup, 0), np.array([0.3, 0.1])
     camera = TableCamera(TABLE, VIEW, np.array([-1.185, 0.0]))

@@ -5,6 +5,7 @@ import pytest
 import torch
 from runs import SMALL, rows
 
+from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.device import moved, torch_device
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
@@ -46,7 +47,7 @@ def test_a_run_and_one_with_its_weights_learn(device, engine, tmp_path):
     config = preset("touch", {**TINY, "device": device, "engine": engine})
     run_training(config, tmp_path / "run")
     assert len(rows(tmp_path / "run")) == 2
-    policy = load_policy(tmp_path / "run")
-    assert policy is not None
+    driver = load_policy(tmp_path / "run")
+    assert evaluate(driver, "touch", episodes=5).episodes == 5
     further = preset("touch", {**TINY, "engine": engine, "init": str(tmp_path / "run")})
     run_training(further, tmp_path / "further")

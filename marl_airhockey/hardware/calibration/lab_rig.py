@@ -71,21 +71,21 @@ def calibrate_lab(client: LabClient) -> Rig:
         frames = _take(camera, PICTURES)
     view = view_from_tags(_steady_tags(frames), known, lab_view(table).lens)
     # A person would click the puck, and a visible part of the paddle.
-    (x, y), (p, q) = view.project(np.concatenate([CLICKED, BLOCK]))
-    u, v = _most_coloured(frames[-1].image, view.project(_rim(client)))
+    image, block = frames[-1].image, None
+    x, y = view.project(CLICKED)[0]
+    if info["block"]:
+        p, q = view.project(BLOCK)[0]
+        block = Colour.around(image, (float(p), float(q)))
+    u, v = _most_coloured(image, view.project(_rim(client)))
     touched = (survey[name] for name in ("places", "touched", "tool"))
     return Rig(
         table=info["table"],
         camera=source,
         view=view,
-        puck=Colour.around(frames[-1].image, (float(x), float(y))),
+        puck=Colour.around(image, (float(x), float(y))),
         puck_marked=info["marked"],
-        block=(
-            Colour.around(frames[-1].image, (float(p), float(q)))
-            if info["block"]
-            else None
-        ),
-        paddle=Colour.around(frames[-1].image, (float(u), float(v)), REACH),
+        block=block,
+        paddle=Colour.around(image, (float(u), float(v)), REACH),
         robot=info["host"],
         mounting=fit_mounting(*(np.array(x) for x in touched)),
         tags={str(k): four.tolist() for k, four in known.items()},

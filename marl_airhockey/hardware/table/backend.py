@@ -289,7 +289,7 @@ class RealBackend(LiveBackend):
             return self.rectifier.rectify(frame.image, width)[..., ::-1]
         status = self.robot.get_observation()
         paddle = np.array([status.x, status.y])
-        bodies = paddle, self._tracker.estimate, self._block.place
+        bodies = paddle, self._tracker.estimate, self._block.position
         return self._devices.overlay.draw(frame.image, *bodies, marks, width)
 
     def close(self) -> None:

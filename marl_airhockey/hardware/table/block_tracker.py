@@ -22,7 +22,7 @@ class BlockTracker:
         self._velocity = np.zeros(2)
 
     @property
-    def place(self) -> Array | None:
+    def position(self) -> Array | None:
         """Position (2,) of the block, m; None before an episode begins."""
         return None if self._last is None else self._last.place
 

@@ -121,8 +121,8 @@ class PersonOperator:
         self._ask(_stopped(stop))
 
 
-def _where(place: Array) -> str:
-    return f"x = {place[0]:+.2f} m, y = {place[1]:+.2f} m"
+def _where(position: Array) -> str:
+    return f"x = {position[0]:+.2f} m, y = {position[1]:+.2f} m"
 
 
 def _stopped(why: str) -> str:
