@@ -180,6 +180,7 @@ BEFORE: Mapping[str, Callable[[World], Columns]] = {
     SENSED: _sensed,
     MEMORY: _memories,
     "observation": _observations,
+    "device.": _devices,
 }
 """Sources of the columns that also exist before the first step, by the prefixes of
 their names."""
@@ -192,7 +193,6 @@ AFTER: Mapping[str, Callable[[World], Columns]] = {
     "returns": lambda world: {"returns": world.episode.returns},
     "success": lambda world: {"success": world.episode.success},
     JUDGED: _judged,
-    "device.": _devices,
 }
 """Sources of the columns that exist only for steps, by the prefixes of their names."""
 

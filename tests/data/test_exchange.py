@@ -21,7 +21,7 @@ from marl_airhockey.data.exchange.trajectories import (
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.relabel import relabelled
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_driver, make_scenario
 from marl_airhockey.sim.core.recording import FILM
 
 pd = pytest.importorskip("pandas")
@@ -93,6 +93,41 @@ def test_lerobot_dataset_is_read_by_pyarrow_and_pandas_alone(tmp_path):
     assert np.allclose(stats["action"]["q10"], np.quantile(actions, 0.1, axis=0))
 
 
+@pytest.mark.parametrize("seat", [0, 1])
+def test_lerobot_has_the_action_chosen_sent_and_applied(tmp_path, seat):
+    keywords = {"drivers": {"paddle_1": "striker"}, "profile": "ur5e"}
+    path = recorded(tmp_path, "duel", "striker", 1, max_cycles=40, **keywords)
+    folder = export_lerobot([path], "duel", tmp_path / "sets", seat)
+    frames = pd.read_parquet(folder / "data")
+    columns = read_recording(path).episodes[0].columns
+    for name in ("action", "applied_action"):
+        single = columns[name][:, seat].astype(np.float32)
+        np.testing.assert_array_equal(np.stack(frames[name]), single)
+    sent = np.stack(frames["sent_action"])
+    ours = make_scenario("duel").scene
+    rotation = ours.table.rotation(ours.seats[seat].side)
+    speed = read_recording(path).episodes[0].physics["paddle_speed"]
+    np.testing.assert_allclose(
+        sent, columns["command"][:, seat] @ rotation.T / speed, rtol=1e-5, atol=1e-6
+    )
+    assert np.abs(np.stack(frames["action"]) - sent).max() > 0.05
+
+
+def test_lerobot_has_the_times_of_a_real_table(tmp_path):
+    path = recorded(tmp_path, episodes=2)
+    for name, late in (("captured", -0.05), ("received", -0.02), ("moment", 0.0)):
+        add_column(path, f"device.{name}", "float64", lambda k, _, t=late: 1e5 + k + t)
+    add_column(path, "device.applied", "float64", lambda k, _: 1e5 + k - 0.9)
+    folder = export_lerobot([path], "reach", tmp_path / "sets")
+    frames = pd.read_parquet(folder / "data")
+    number = frames["frame_index"] + 1e5
+    # Before a step; the action of the step is applied afterwards.
+    np.testing.assert_allclose(frames["captured_time"], number - 0.05)
+    np.testing.assert_allclose(frames["received_time"], number - 0.02)
+    np.testing.assert_allclose(frames["observed_time"], number)
+    np.testing.assert_allclose(frames["applied_time"], number + 0.1)
+
+
 def test_lerobot_video_shows_the_newest_picture_of_each_step(tmp_path):
     path = recorded(tmp_path, episodes=2)
     code = cv2.VideoWriter.fourcc(*"MJPG")
@@ -158,23 +193,28 @@ def test_an_exported_video_has_a_codec_that_browsers_play(tmp_path):
         assert video.streams.video[0].codec_context.name == "h264"
 
 
+def add_column(path, name, dtype, values_of):
+    """Give all steps a column, a function of their numbers and their episodes."""
+    meta = json.loads((path / "meta.json").read_text())
+    meta["columns"][name] = {"dtype": dtype, "shape": []}
+    (path / "meta.json").write_text(json.dumps(meta))
+    for part in (path / "steps").iterdir():
+        table = pq.read_table(part)
+        numbers = (table[key].to_numpy() for key in ("step", "episode"))
+        values = values_of(*numbers).astype(dtype)
+        pq.write_table(table.append_column(name, [values.tolist()]), part)
+
+
 def _add_frames(path, numbers, later=0):
     """Give the steps of each episode the numbers of pictures, the last one on.
 
     Those of each episode begin ``later`` after those of the one before.
     """
-    meta = json.loads((path / "meta.json").read_text())
-    meta["columns"]["frame"] = {"dtype": "int64", "shape": []}
-    (path / "meta.json").write_text(json.dumps(meta))
-    for part in (path / "steps").iterdir():
-        frame = pq.read_table(part).to_pandas()
-        step = frame["step"].to_numpy()
-        shown = np.array(numbers)[np.minimum(step, len(numbers) - 1)]
-        frame["frame"] = shown + later * frame["episode"].to_numpy()
-        table = pq.read_table(part).append_column(
-            "frame", [frame["frame"].astype("int64").tolist()]
-        )
-        pq.write_table(table, part)
+
+    def shown(step, episode):
+        return np.array(numbers)[np.minimum(step, len(numbers) - 1)] + later * episode
+
+    add_column(path, "frame", "int64", shown)
 
 
 def made_file(path, columns=35, robot_frame=False, inverted=False, rows=40):

@@ -4,14 +4,18 @@ A frame contains the values before a step, the action, and its result (`next.*`)
 observation after the last step of an episode is a column of the table of episodes,
 `final/NAME`, which LeRobot ignores. The video of a real table has one image per step:
 the newest camera frame at the start of the step.
+
+LeRobot computes its `timestamp` from the rate. The times that were measured on a real
+table are further features, `TIMES`.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +24,7 @@ from marl_airhockey.data.exchange.lerobot_writer import (
 )
 from marl_airhockey.data.exchange.seats import (
     agent_at,
+    all_rows,
     check_seat,
     cut_off,
     episodes_with_steps,
@@ -30,12 +35,26 @@ from marl_airhockey.data.files import named_folder, shared_head, whole_folder
 from marl_airhockey.data.film import count_frames, film_gap
 from marl_airhockey.make import parallel_env
 from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.geometry import products
 from marl_airhockey.sim.core.recording import FILM, Columns, Episode
 from marl_airhockey.types import Array
 
 STATE = ("position", "velocity", "angle", "spin")
 """Fields of the true state that form `observation.environment_state`."""
 OBSERVATION, ACTION = "observation.state", "action"
+SENT, APPLIED = "sent_action", "applied_action"
+"""Features with the command after all limits, and the resulting motion of the paddle,
+both as actions."""
+TIMES = {
+    "captured_time": "device.captured",
+    "received_time": "device.received",
+    "observed_time": "device.moment",
+}
+"""Features with times before a step, by column, s, monotonic clock: exposure and
+arrival of the newest frame, and time of the observation."""
+APPLIED_TIME, APPLIED_AT = "applied_time", "device.applied"
+"""Feature and column with the time at which the robot client began to execute the
+action, s."""
 
 
 def export_lerobot(
@@ -67,14 +86,15 @@ def export_lerobot(
     films = {path: path / FILM for path in files if (path / FILM).exists()}
     lengths = {path: count_frames(film) for path, film in films.items()}
     with whole_folder(final) as folder:
-        writer = LeRobotWriter(folder, round(rate), _names(head, seat))
+        form = _form(head, seat)
+        writer = LeRobotWriter(folder, round(rate), form.names)
         for path, episode in episodes_with_steps(files):
             check_seat(episode, seat)
             gap = film_gap(path, episode, lengths[path]) if path in lengths else ""
             if gap:
                 warnings.warn(f"{gap}; left out", RuntimeWarning, stacklevel=2)
                 continue
-            frames, last = _frames(path, episode, seat)
+            frames, last = _frames(path, episode, form)
             writer.add(frames, last, _task(head), *_film(path, episode))
         if not writer.episodes:
             raise ValueError(f"{files[0]}: the video ends before every episode")
@@ -87,49 +107,88 @@ def _task(head: Mapping[str, Any]) -> str:
     return f"air hockey: {head['scenario'].replace('_', ' ')}"
 
 
-def _names(head: Mapping[str, Any], seat: int) -> dict[str, list[str]]:
-    """Return the names of the elements of each feature."""
-    names = {ACTION: ["x", "y"], "applied_action": ["x", "y"]}
-    if "goals" not in head:
-        env = parallel_env(head["scenario"], **playable(head))
-        labels = env.observation_labels(agent_at(env.possible_agents, seat))
-        names[OBSERVATION] = list(labels)
-        env.close()
-    return names
+class _Form(NamedTuple):
+    """Form of the frames of one seat."""
+
+    seat: int
+    names: dict[str, list[str]]
+    """Names of the elements of each feature."""
+    rotation: Array
+    """Rotation (2, 2) from the table frame to the seat's ego frame."""
 
 
-def _frames(path: Path, episode: Episode, seat: int) -> tuple[Columns, Columns]:
+def _form(head: Mapping[str, Any], seat: int) -> _Form:
+    names = {name: ["x", "y"] for name in (ACTION, SENT, APPLIED)}
+    with closing(parallel_env(head["scenario"], **playable(head))) as env:
+        scene = env.world.scene
+        if "goals" not in head:
+            agent = agent_at(env.possible_agents, seat)
+            names[OBSERVATION] = list(env.observation_labels(agent))
+    return _Form(seat, names, scene.table.rotation(scene.seats[seat].side))
+
+
+def _frames(path: Path, episode: Episode, form: _Form) -> tuple[Columns, Columns]:
     """Return the features (T, ...) of an episode and its last observation."""
-    columns, shown = episode.columns, {}
+    columns, seat, shown = episode.columns, form.seat, {}
     for part, values in observations_of(path, episode).items():
         name = OBSERVATION if part in ("", "observation") else f"observation.{part}"
         shown[name] = values[:, seat].astype(np.float32)
-    state = [
-        np.concatenate([episode.first[f"state.{n}"][None], columns[f"state.{n}"][:-1]])
-        for n in STATE
-        if f"state.{n}" in columns
-    ]
-    if state:
-        flat = [values.reshape(len(values), -1) for values in state]
-        known = {"observation.environment_state": np.concatenate(flat, 1)}
-    else:
-        known = {}
     ended, truncated = cut_off(episode)
     frames = {
         **{name: values[:-1] for name, values in shown.items()},
-        **{name: values.astype(np.float32) for name, values in known.items()},
+        **_state(episode),
         ACTION: columns["action"][:, seat].astype(np.float32),
+        **_motion(episode, form),
         "next.reward": columns["reward"][:, seat].astype(np.float32),
         "next.success": columns["success"][:, seat].astype(bool),
         "next.terminated": ended,
         "next.truncated": truncated,
         "next.done": ended | truncated,
+        **_times(episode),
     }
-    if "applied_action" in columns:
-        frames["applied_action"] = columns["applied_action"][:, seat].astype(np.float32)
-    if "device.moment" in columns:
-        frames["measured_time"] = columns["device.moment"]
     return frames, {name: values[-1] for name, values in shown.items()}
+
+
+def _state(episode: Episode) -> Columns:
+    """Return the true state (T, D) before each step, if it was recorded."""
+    states = [
+        all_rows(episode, f"state.{name}")[:-1]
+        for name in STATE
+        if f"state.{name}" in episode.columns
+    ]
+    if not states:
+        return {}
+    flat = [values.reshape(len(values), -1) for values in states]
+    return {"observation.environment_state": np.concatenate(flat, 1, dtype=np.float32)}
+
+
+def _motion(episode: Episode, form: _Form) -> Columns:
+    """Return what was sent and what the paddle did (T, 2), as actions.
+
+    On a real table, the arm reports the velocity of the paddle.
+    """
+    sources = {SENT: "command", APPLIED: "state.velocity"}
+    return {
+        name: (
+            products(episode.columns[column][:, form.seat], form.rotation)
+            / episode.physics["paddle_speed"]
+        ).astype(np.float32)
+        for name, column in sources.items()
+        if column in episode.columns and "paddle_speed" in episode.physics
+    }
+
+
+def _times(episode: Episode) -> Columns:
+    """Return the times of a real table (T,), s, as far as they were recorded."""
+    columns = episode.columns
+    times = {
+        name: all_rows(episode, column)[:-1]
+        for name, column in TIMES.items()
+        if column in columns and column in episode.first
+    }
+    if APPLIED_AT in columns:
+        times[APPLIED_TIME] = columns[APPLIED_AT]
+    return {name: values for name, values in times.items() if np.isfinite(values).all()}
 
 
 def _film(path: Path, episode: Episode) -> tuple[Path, Array] | tuple[()]:

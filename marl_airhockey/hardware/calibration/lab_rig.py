@@ -180,6 +180,20 @@ def lab_rig() -> Iterator[Path]:
 
 
 @contextmanager
+def opened_rig(rig: str | Path) -> Iterator[Path]:
+    """Yield a rig's file: that of the `running_lab` for "lab", otherwise ``rig``.
+
+    Raises:
+        RuntimeError: The lab does not start.
+    """
+    if str(rig) != "lab":
+        yield Path(rig)
+        return
+    with lab_rig() as path:
+        yield path
+
+
+@contextmanager
 def hand_rig() -> Iterator[Path]:
     """Yield the rig's file of the hand in the `running_lab`.
 

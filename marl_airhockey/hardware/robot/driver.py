@@ -70,6 +70,7 @@ class ArmDriver:
         self._dt = 1.0 / RATE
         self._cycles = self._late = self._refused = self._logged = 0
         self._recovered, self._seen = box.request.recover, 0.0
+        self._applied = 0.0
         self._due, reading = clock(), arm.read()
         position = self._position(reading)
         self._motion = Motion(config, self._dt, position)
@@ -160,7 +161,7 @@ class ArmDriver:
         size = math.hypot(request.vx, request.vy)
         finite = math.isfinite(size) and math.isfinite(request.seconds)
         if request.stamp != self._seen:
-            self._seen = request.stamp
+            self._seen, self._applied = request.stamp, now
             self._refused += not finite
         if not self.supervisor.pressed_at:
             self._arm.press(self._config.mounting.frame(), self._config.servo.force)
@@ -239,6 +240,7 @@ class ArmDriver:
             misalignment=mounting.misalignment(reading.pose),
             speed_scaling=self._motion.scaling,
             braked_at=self.supervisor.braked_at,
+            applied_at=self._applied,
         )
 
     def close(self) -> None:

@@ -103,6 +103,9 @@ class RobotObservation(NamedTuple):
     """Number of commands that were not finite."""
     braked_at: float
     """Time at which braking last began, monotonic clock."""
+    applied_at: float
+    """Time of the cycle that first executed the newest command, monotonic clock; 0
+    before the first."""
 
     @property
     def joints(self) -> tuple[float, ...]:

@@ -12,12 +12,13 @@ import numpy as np
 
 from marl_airhockey.hardware.camera import Camera
 from marl_airhockey.hardware.rig import Rig
-from marl_airhockey.hardware.robot import DriverState, Robot, RobotError
-from marl_airhockey.hardware.robot.supervisor import LATCHED
+from marl_airhockey.hardware.robot import Robot, RobotError
 from marl_airhockey.hardware.table.block_tracker import BlockTracker
 from marl_airhockey.hardware.table.devices import TableDevices
+from marl_airhockey.hardware.table.overlay import scaled
 from marl_airhockey.hardware.table.placing import Placing
 from marl_airhockey.hardware.table.tracker import Tracker
+from marl_airhockey.hardware.table.troubles import robot_trouble, trouble_of
 from marl_airhockey.hardware.vision.rectifier import Rectifier
 from marl_airhockey.sim.contracts.backend import Command, LiveBackend
 from marl_airhockey.sim.contracts.mark import Mark
@@ -31,14 +32,8 @@ from marl_airhockey.types import Array
 log = logging.getLogger("marl_airhockey.real")
 PROFILE = "ur5e"
 """Profile of the table's robot."""
-BLIND = 0.3
-"""Time without a camera frame after which an episode ends, s."""
-DELAYED = 0.15
-"""Time from an exposure until its frame arrives after which an episode ends, s."""
 LATE = 0.02
 """Time from the end of a step to the next command beyond which it is logged, s."""
-LOST = 2.0
-"""Time for which a puck may be unseen, s."""
 
 
 class RealBackend(LiveBackend):
@@ -59,7 +54,7 @@ class RealBackend(LiveBackend):
     instant_contacts: ClassVar[bool] = False
     tracks_commands: ClassVar[bool] = False
     timestep: ClassVar[float | None] = None
-    viewpoints: ClassVar[tuple[str, ...]] = ("table", "rectified")
+    viewpoints: ClassVar[tuple[str, ...]] = ("table", "rectified", "camera")
 
     def __init__(
         self,
@@ -74,7 +69,8 @@ class RealBackend(LiveBackend):
         self.placing = Placing(devices, scene)
         self._reason = ""
         self._due = 0.0
-        self._began = self._moment = 0.0
+        self._moment = self._served = 0.0
+        self._frame: tuple[float | None, float | None] = None, None
         self._overruns = 0
         self._commanded = np.zeros(2)
 
@@ -144,20 +140,19 @@ class RealBackend(LiveBackend):
         return self._reason
 
     def arrange(self, state: State) -> State:
-        self._reason = ""
+        self._reason, begun = "", self.scene.still_state(1)
         self._tracker.forget()
         try:
             seen = self.placing.place(state)
         except RobotError as error:
             raise RuntimeError(str(error)) from error
         self.robot.enable()
-        self._began = self._due = time.monotonic()
-        begun = self.scene.still_state(1)
+        began = self._due = time.monotonic()
         if seen:
             self._tracker.begin(seen)
         if self.placing.seen_block is not None:
             self._block.begin(self.placing.seen_block)
-        self._fill(begun, self._began, self._began)
+        self._fill(begun, began, began)
         begun.time[:] = 0.0
         return begun
 
@@ -166,9 +161,8 @@ class RealBackend(LiveBackend):
 
     def _move(self, command: Command, before: State, after: State) -> None:
         """Send the command, wait for the end of the step and fill ``after``."""
-        self._commanded = command.velocity[0, 0].copy()
         self._report_lateness(time.monotonic())
-        self.robot.send_action(self._commanded, self.control_dt)
+        self.send(command.velocity[0, 0])
         self._due += self.control_dt
         left = self._due - time.monotonic()
         if left > 0:
@@ -178,15 +172,43 @@ class RealBackend(LiveBackend):
             if left < -2 * self.control_dt:
                 # Missed time is not made up for by shorter steps.
                 self._due = time.monotonic()
+        self.look(after)
+        after.time[:] = before.time + self.control_dt
+
+    def send(self, velocity: Array) -> Array:
+        """Command a velocity (2,), table frame, m/s; return the one that was sent."""
+        self._commanded = velocity.copy()
+        return self.robot.send_action(self._commanded, self.control_dt)
+
+    def look(self, state: State) -> None:
+        """Fill a state with the present one and the contacts of the last control step.
+
+        If an episode cannot continue, the paddle brakes, and `interruption` gives the
+        reason.
+
+        Args:
+            state: State of one world.
+        """
         now = time.monotonic()
         for name in ("touched", "banked", "crossed", "crossed_velocity", "lifted"):
-            getattr(after, name)[:] = 0
-        after.touched_at[:] = np.nan
-        self._fill(after, now, now - self.control_dt)
-        after.time[:] = before.time + self.control_dt
-        self._reason = self._reason or self._trouble(now)
+            getattr(state, name)[:] = 0
+        state.touched_at[:] = np.nan
+        self._fill(state, now, now - self.control_dt)
+        self._reason = self._reason or trouble_of(self._devices, self._tracker, now)
         if self._reason:
             self.robot.disable()
+
+    def serve(self, puck: Array, velocity: Array) -> None:
+        """Have the operator release the puck elsewhere, while the paddle continues.
+
+        Args:
+            puck: Position (2,), table frame, m.
+            velocity: Velocity (2,), table frame, m/s.
+        """
+        self.placing.operator.place(puck, velocity, None)
+        self.placing.operator.release()
+        self._tracker.forget()
+        self._served = time.monotonic()
 
     def _report_lateness(self, began: float) -> None:
         """Log a warning if the command of a step is late.
@@ -202,34 +224,6 @@ class RealBackend(LiveBackend):
                 1e3 * took,
             )
 
-    def _trouble(self, now: float) -> str:
-        """Return the reason why the episode cannot continue; "" if it can."""
-        return self._robot_trouble() or (
-            self._blindness(now) if self.scene.pucks else ""
-        )
-
-    def _robot_trouble(self) -> str:
-        """Return the reason why the robot does not follow commands; "" if it does."""
-        robot = self.robot
-        # A HOLD because commands were late ends with the next command.
-        held = robot.state is DriverState.HOLD and robot.fault in LATCHED
-        if held or robot.state is DriverState.FAULT:
-            return f"robot: {robot.fault.label}"
-        return "" if robot.is_connected else "robot: its driver has ended"
-
-    def _blindness(self, now: float) -> str:
-        """Return the reason why the puck's state is not known; "" if it is."""
-        camera, last = self.camera, self._tracker.last
-        if camera.age > BLIND:
-            return camera.trouble
-        if camera.transit > DELAYED:
-            return f"camera: frames arrive {camera.transit:.2f} s after their exposure"
-        if self._devices.watcher.trouble:
-            return self._devices.watcher.trouble
-        if last is not None and now - last.time > LOST:
-            return f"puck: not seen for {LOST:.0f} s"
-        return self._tracker.innovations.trouble
-
     def _fill(self, state: State, now: float, since: float) -> None:
         """Fill a state with present positions and velocities, and with new contacts.
 
@@ -239,11 +233,15 @@ class RealBackend(LiveBackend):
             since: Time at which the step began, s.
         """
         self._moment = now
+        watcher = self._devices.watcher
+        self._frame = watcher.looked_at, watcher.arrived_at
         status = self.robot.get_observation()
         state.position[0, 0] = status.x, status.y
         state.velocity[0, 0] = status.vx, status.vy
         if self.scene.pucks:
-            seen = self._devices.watcher.take()
+            seen = [s for s in watcher.take() if s.taken > self._served]
+            if seen and self._tracker.last is None:
+                self._tracker.begin(seen)
             self._tracker.fill(state, seen, self.robot.track, now, since)
         if self._devices.block_watcher is not None:
             self._block.fill(state, self._devices.block_watcher.take())
@@ -259,9 +257,11 @@ class RealBackend(LiveBackend):
         )
         return {
             "moment": self._moment,
+            **dict(zip(("captured", "received"), self._frame, strict=True)),
+            "applied": status.applied_at,
             "robot": self.robot.state.name,
             "fault": self.robot.fault.label,
-            "trouble": self._robot_trouble(),
+            "trouble": robot_trouble(self.robot),
             "asked": [round(float(x), 4) for x in self._commanded],
             "sent": [round(status.sent_vx, 4), round(status.sent_vy, 4)],
             "sent_position": [round(status.sent_x, 4), round(status.sent_y, 4)],
@@ -287,6 +287,8 @@ class RealBackend(LiveBackend):
             raise RuntimeError(self.camera.trouble or "camera: no frame yet")
         if viewpoint == "rectified":
             return self.rectifier.rectify(frame.image, width)[..., ::-1]
+        if viewpoint == "camera":
+            return scaled(frame.image, width)[..., ::-1]
         status = self.robot.get_observation()
         paddle = np.array([status.x, status.y])
         bodies = paddle, self._tracker.estimate, self._block.position

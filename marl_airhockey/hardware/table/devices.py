@@ -48,6 +48,8 @@ class TableDevices:
                 "lab that has one, airhockey lab --block"
             )
         self.rig = rig
+        self.pucks = scene.pucks
+        """Number of pucks on the table."""
         config = rig.robot_config(scene.seats[0].reach)
         half = tuple(float(x) for x in table.size / 2)
         detector = Detector(

@@ -79,10 +79,7 @@ class Overlay:
         if puck is not None:
             self._line(drawn, puck[:2] + table.puck_radius * CIRCLE, PUCK)
             self._line(drawn, np.stack([puck[:2], puck[:2] + AHEAD * puck[2:]]), PUCK)
-        height = round(width * image.shape[0] / image.shape[1])
-        if width != image.shape[1]:
-            drawn = cv2.resize(drawn, (width, height), interpolation=cv2.INTER_AREA)
-        return np.asarray(drawn)
+        return scaled(np.asarray(drawn), width)
 
     def _line(self, image: Array, points: Array, colour: tuple[int, int, int]) -> None:
         """Draw a line with dark edges through points (n, 2) on the table."""
@@ -90,3 +87,11 @@ class Overlay:
         pixels = np.round(self._view.project(flat) * 16).astype(np.int32)
         for ink, width in ((EDGE, 4), (colour, 2)):
             cv2.polylines(image, [pixels], False, ink, width, cv2.LINE_AA, 4)
+
+
+def scaled(image: Array, width: int) -> Array:
+    """Return an image (H, W, 3) uint8 that is ``width`` pixels wide."""
+    if width == image.shape[1]:
+        return image
+    height = round(width * image.shape[0] / image.shape[1])
+    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA))

@@ -37,6 +37,8 @@ class Watcher:
         """Newest sighting; None before the first."""
         self.looked_at = float("nan")
         """Time at which the newest searched frame was taken, s."""
+        self.arrived_at = float("nan")
+        """Time at which that frame arrived, s."""
         self.seconds = 0.0
         """CPU time of the detector so far, s."""
         self.pictures = 0
@@ -82,7 +84,7 @@ class Watcher:
             seen = None if repeated else self._detector.find(frame)
             self.seconds += time.thread_time() - began
             self.pictures += 1
-            self.looked_at = frame.taken
+            self.looked_at, self.arrived_at = frame.taken, frame.arrived
             if seen is not None:
                 self.last = seen
                 self._found.append(seen)

@@ -68,7 +68,10 @@ UNITS: Mapping[str, tuple[str, str]] = {
     "clock": ("s, Unix time", ""),
     "round_trip": ("ms", ""),
     "pointer": ("m", "table"),
-    "device.moment": ("s, monotonic", ""),
+    **dict.fromkeys(
+        (f"device.{name}" for name in ("moment", "captured", "received", "applied")),
+        ("s, monotonic", ""),
+    ),
     "frame_taken": ("s, monotonic", ""),
 }
 """Unit and frame of the columns that have one, by name."""

@@ -41,6 +41,8 @@ TRAIL, SERVED = 0.6, 0.4
 above which a puck was re-served between two points."""
 WIDTH = 880
 """Default width of an image, pixels."""
+BAR = 44
+"""Height of the title bar, pixels."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +65,15 @@ class Frame:
     """True for eliminated seats (seats,); empty if no seat can be eliminated."""
 
 
-def draw(frame: Frame, width: int = WIDTH) -> Array:
-    """Return the image (H, W, 3) uint8 RGB of a frame, ``width`` pixels wide."""
-    canvas = Canvas(frame.scene.table, width, margin=0.075, bar=44)
+def draw(frame: Frame, width: int = WIDTH, bar: int = BAR) -> Array:
+    """Return the image (H, W, 3) uint8 RGB of a frame.
+
+    Args:
+        frame: Contents of the image.
+        width: Width of the image, pixels.
+        bar: Height of the title bar, pixels; 0 for none.
+    """
+    canvas = Canvas(frame.scene.table, width, margin=0.075, bar=bar)
     _table(canvas, frame)
     for mark in frame.marks:
         _mark(canvas, mark)
@@ -77,7 +85,8 @@ def draw(frame: Frame, width: int = WIDTH) -> Array:
         goal = mark.kind == "circle" and mark.means == "goal"
         if goal and mark.radius < frame.scene.table.paddle_radius:
             canvas.ring(mark.start, mark.radius, GOAL, 2)
-    _bar(canvas, frame)
+    if bar:
+        _bar(canvas, frame)
     return canvas.finish()
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pages import page_at, point_of, running, state_of, wait
 
+from marl_airhockey.data.exchange.seats import all_rows
 from marl_airhockey.data.extract import extract
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.hardware.lab.lab import LabClient
@@ -114,6 +115,15 @@ def test_a_person_leads_the_arm_by_its_video(teleop):
     (episode,) = recording.episodes
     assert episode.columns["device.joints"].shape[-1] == 6
     assert {"device.force", "device.sent", "applied_action"} <= set(episode.columns)
+    captured, received, seen, applied = (
+        all_rows(episode, f"device.{name}")
+        for name in ("captured", "received", "moment", "applied")
+    )
+    assert (captured < received).all()
+    assert (received <= seen).all()
+    # A command is executed in the cycle after it was given.
+    assert np.median(applied[1:] - seen[:-1]) < 0.03
+    assert (applied[1:] < seen[1:]).all()
     assert recording.head["players"][0]["driver"] == "person"
     # What the video shows is what was there.
     found = extract(path)
