@@ -1,14 +1,13 @@
 """Train MAPPO, IPPO and MADDPG of BenchMARL on the games with teams; print a table.
 
     python -m venv .venv-benchmarl
-    .venv-benchmarl/bin/pip install torch 'benchmarl==1.5.2' -e .
+    .venv-benchmarl/bin/pip install 'benchmarl==1.5.2' -e . plugins/benchmarl_airhockey
     .venv-benchmarl/bin/python scripts/reproduce/marl.py --seeds 3
     .venv-benchmarl/bin/python scripts/reproduce/marl.py --seeds 0      # the table
 
 BenchMARL 1.5 needs a TorchRL below 0.12, and the extra ``ecosystem`` needs a later one.
-It therefore has a separate environment. BenchMARL is not modified. `AirHockey` is a
-task as its documentation describes, over `ah.make_torchrl`, which steps all worlds in
-one call.
+It therefore has a separate environment. BenchMARL is not modified. The tasks are those
+of the package `plugins/benchmarl_airhockey`, which steps all worlds in one call.
 
 All policies of a team share a network. The critics of MAPPO and MADDPG observe the true
 state. In doubles the team plays against two goalkeepers. A finished run adds a row to
@@ -20,101 +19,35 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import torch
 import typer
 from benchmarl.algorithms import IppoConfig, MaddpgConfig, MappoConfig
-from benchmarl.environments.common import TaskClass
 from benchmarl.experiment import Experiment, ExperimentConfig
 from benchmarl.models.mlp import MlpConfig
+from benchmarl_airhockey import AirHockeyTask
 from rich.console import Console
 from rich.table import Table
 from rows import DATA, Again, Book, Cell, Row, RowsFile, read
-from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 
 ALGORITHMS = {"mappo": MappoConfig, "ippo": IppoConfig, "maddpg": MaddpgConfig}
-GAMES: dict[str, dict[str, Any]] = {
+GAMES = {
     "rally": {},
     "team_juggle": {},
-    "doubles": {"drivers": dict.fromkeys(("paddle_2", "paddle_3"), "goalkeeper")},
+    "doubles": dict.fromkeys(("paddle_2", "paddle_3"), "goalkeeper"),
 }
-"""Keywords of the environment, by game."""
+"""Drivers of the other team, by game."""
 SCRIPTS = ("striker", "allround")
 """Drivers that are measured for comparison."""
 WORLDS, EPISODES = 100, 500
 FIELDS = ("game", "policy", "seed", "frames", "success", "team_return", "cpu_minutes")
 BOOK = Book(DATA / "marl.csv", FIELDS[:3])
-
-
-class AirHockey(TaskClass):  # type: ignore[misc]
-    """Task of BenchMARL: worlds of a game, a group for each team, the true state."""
-
-    def get_env_fun(
-        self, num_envs: int, continuous_actions: bool, seed: int | None, device: Any
-    ) -> Callable[[], EnvBase]:
-        """Return a function that builds ``num_envs`` worlds as one environment."""
-
-        def build() -> EnvBase:
-            env = ah.make_torchrl(self.name.lower(), num_envs, device, **self.config)
-            env.set_seed(seed)
-            return env
-
-        return build
-
-    def supports_continuous_actions(self) -> bool:
-        """Return True, because actions are velocities."""
-        return True
-
-    def supports_discrete_actions(self) -> bool:
-        """Return False."""
-        return False
-
-    def max_steps(self, env: EnvBase) -> int:
-        """Return the length of an episode."""
-        return int(env.world.max_cycles)
-
-    def has_render(self, env: EnvBase) -> bool:
-        """Return False, because no images are needed."""
-        return False
-
-    def group_map(self, env: EnvBase) -> dict[str, list[str]]:
-        """Return the agents of each group."""
-        return dict(env.group_map)
-
-    def observation_spec(self, env: EnvBase) -> Any:
-        """Return the spec of the agents' observations, without the state."""
-        spec = env.full_observation_spec_unbatched.clone()
-        del spec["state"]
-        return spec
-
-    def info_spec(self, env: EnvBase) -> None:
-        """Return None, because there are no infos."""
-
-    def state_spec(self, env: EnvBase) -> Any:
-        """Return the spec of the state, for critics."""
-        spec = env.full_observation_spec_unbatched.clone()
-        for group in env.group_map:
-            del spec[group]
-        return spec
-
-    def action_spec(self, env: EnvBase) -> Any:
-        """Return the spec of the actions."""
-        return env.full_action_spec_unbatched
-
-    def action_mask_spec(self, env: EnvBase) -> None:
-        """Return None, because every action is allowed."""
-
-    @staticmethod
-    def env_name() -> str:
-        """Return the name of the environment in results."""
-        return "marl_airhockey"
 
 
 def settings(frames: int) -> ExperimentConfig:
@@ -136,7 +69,7 @@ def settings(frames: int) -> ExperimentConfig:
 
 def measure(experiment: Experiment, game: str) -> tuple[float, float]:
     """Return the success and the mean return of a team over whole episodes."""
-    env = ah.make_torchrl(game, EPISODES, **GAMES[game])
+    env = ah.make_torchrl(game, EPISODES, drivers=GAMES[game])
     env.set_seed(TEST_SEED)
     seen = env.reset()
     going = torch.ones(EPISODES, dtype=torch.bool)
@@ -155,8 +88,11 @@ def measure(experiment: Experiment, game: str) -> tuple[float, float]:
 def train_cell(game: str, algorithm: str, seed: int, frames: int) -> Row:
     """Train one policy and return its row."""
     began = time.process_time()
+    task = AirHockeyTask[game.upper()].get_from_yaml()
+    if GAMES[game]:
+        task.config["opponent"] = "goalkeeper"
     experiment = Experiment(
-        task=AirHockey(game.upper(), GAMES[game]),
+        task=task,
         algorithm_config=ALGORITHMS[algorithm].get_from_yaml(),
         model_config=MlpConfig.get_from_yaml(),
         critic_model_config=MlpConfig.get_from_yaml(),
@@ -172,7 +108,7 @@ def train_cell(game: str, algorithm: str, seed: int, frames: int) -> Row:
 
 def play_script(game: str, name: str) -> Row:
     """Return the row of a team of scripts."""
-    teammate = {"paddle_1": name, **GAMES[game].get("drivers", {})}
+    teammate = {"paddle_1": name, **GAMES[game]}
     result = evaluate(
         ah.make_driver(name),
         game,

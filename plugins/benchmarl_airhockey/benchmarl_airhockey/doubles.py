@@ -1,0 +1,16 @@
+"""Configuration of doubles."""
+
+from dataclasses import MISSING, dataclass
+
+
+@dataclass
+class TaskConfig:
+    """Game of two teams of two paddles."""
+
+    profile: str = MISSING
+    opponent: str = MISSING
+    max_cycles: int = MISSING
+    goals_to_win: int = MISSING
+    scored_weight: float = MISSING
+    shot_weight: float = MISSING
+    reaction: float = MISSING
