@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo check ci test test-short test-realtime test-one test-all test-distributed lint docs pages wheel clean
+.PHONY: help setup demo check ci test test-short test-realtime test-one test-all test-distributed test-ecosystem lint docs pages wheel clean
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -91,12 +91,34 @@ RLLIB = $(FAR)/bin/python -m pytest -W ignore tests/learn/test_rllib.py
 test-distributed: $(FAR)/.ready ## Run the short test of RLlib, in an environment of its own
 	$(RLLIB) -m 'not slow'
 
+# BenchMARL and LeRobot pin other packages, so each has an environment of its own.
+BENCHMARL := .venv-benchmarl
+LEROBOT := .venv-lerobot
+LEROBOT_PYTHON ?= python3.12
+WITH_PYTEST := pytest pytest-timeout
+
+$(BENCHMARL)/.ready:
+	$(PYTHON) -m venv $(BENCHMARL)
+	$(BENCHMARL)/bin/pip install --quiet $(WITH_PYTEST) benchmarl==1.5.2 -e . \
+		-e plugins/benchmarl_airhockey
+	touch $@
+
+$(LEROBOT)/.ready:
+	$(LEROBOT_PYTHON) -m venv $(LEROBOT)
+	$(LEROBOT)/bin/pip install --quiet $(WITH_PYTEST) 'lerobot[core-scripts,training]==0.6.1' \
+		-e '.[play,data,hardware]' -e plugins/lerobot_env_airhockey -e plugins/lerobot_robot_airhockey
+	touch $@
+
+test-ecosystem: $(BENCHMARL)/.ready $(LEROBOT)/.ready ## Test the packages for BenchMARL and LeRobot
+	$(BENCHMARL)/bin/python -m pytest -W ignore plugins/benchmarl_airhockey
+	$(LEROBOT)/bin/python -m pytest -W ignore plugins/lerobot_env_airhockey plugins/lerobot_robot_airhockey
+
 # Types of a clone are checked as far as those of another one were.
 lint check: export MYPY_CACHE_DIR := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/marl_airhockey/mypy
 lint: setup ## Check format, style, spelling, layers and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md docs marl_airhockey scenarios drivers scripts tests
+	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md docs marl_airhockey scenarios drivers plugins scripts tests
 	$(BIN)/python scripts/check_prose.py
 	$(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/mypy

@@ -20,7 +20,7 @@ from prose_texts import Text, texts_of
 
 ROOT = Path(__file__).parent.parent
 RULES = Path(__file__).with_name("prose.toml")
-FOLDERS = ("docs", "drivers", "marl_airhockey", "scenarios", "scripts")
+FOLDERS = ("docs", "drivers", "marl_airhockey", "plugins", "scenarios", "scripts")
 PAGES = ("README.md", "CONTRIBUTING.md", "ARCHITECTURE.md", "CHANGELOG.md")
 LONGEST_SENTENCE, LONGEST_LINE, MOST_COLUMNS = 25, 100, 8
 SENTENCE_END = re.compile(r"(?<=[.!?:;])\s+(?=[A-Z`*\"(\[])|\n\s*\n|\n\s*[-*|\d]")
