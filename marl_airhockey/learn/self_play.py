@@ -9,9 +9,10 @@ import numpy as np
 from marl_airhockey.envs.slots import SlotEnv
 from marl_airhockey.evaluation.games import teams_of
 from marl_airhockey.learn.action_penalty import ActionPenalty
+from marl_airhockey.learn.device import torch_device
 from marl_airhockey.learn.self_play_config import SelfPlayConfig
+from marl_airhockey.learn.snapshot_pool import MEMBER, SnapshotPool
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
-from marl_airhockey.policies.policy import policy_driver
 from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.world.roster import Roster
 from marl_airhockey.sim.world.step_result import StepResult
@@ -53,8 +54,11 @@ class SelfPlayEnv(SlotEnv):
         for name, driver in scripted.items():
             self._roster.add(name, driver)
         self._scripts = len(scripted)
+        self._pool = SnapshotPool(torch_device(config.device))
         self._scores = np.full(self._scripts, 0.5)
         self._snapshots: list[Path] = []
+        self._opponent = np.full(num_worlds, -1)
+        """Index in the scores of the opponent in each world; -1 for none."""
         mirrored = np.arange(self._mirrored)
         others = np.arange(self._mirrored, num_worlds)
         seats, teammates = len(scene.seats), self._members.shape[1]
@@ -73,7 +77,8 @@ class SelfPlayEnv(SlotEnv):
     @property
     def scores(self) -> dict[str, float]:
         """Running score of the learner against each opponent, by name."""
-        names = self._roster.names
+        past = [path.stem for path in self._snapshots]
+        names = [*self._roster.names[: self._scripts], *past]
         return dict(zip(names, self._scores.tolist(), strict=True))
 
     def snapshot(self, policy: NumpyPolicy, steps: int) -> None:
@@ -91,19 +96,22 @@ class SelfPlayEnv(SlotEnv):
         self._add_opponent(path)
 
     def _add_opponent(self, path: Path) -> None:
-        driver = policy_driver(NumpyPolicy.load(path), str(path), deterministic=False)
+        policy = NumpyPolicy.load(path)
+        if not len(self._pool):
+            self._pool.put(0, policy)
+            self._roster.add("pool", self._pool)
         if len(self._snapshots) < self._config.pool:
-            self._roster.add(path.stem, driver)
+            self._pool.put(len(self._snapshots), policy)
             self._scores = np.append(self._scores, 0.5)
             self._snapshots.append(path)
             return
         weakest = int(self._scores[self._scripts :].argmax())
-        player = self._scripts + weakest
+        opponent = self._scripts + weakest
         self._snapshots[weakest].unlink()
         self._snapshots[weakest] = path
-        self._roster.replace(player, path.stem, driver)
-        self._scores[player] = 0.5
-        self._begin(np.flatnonzero((self._roster.seated == player).any(-1)))
+        self._pool.put(weakest, policy)
+        self._scores[opponent] = 0.5
+        self._begin(np.flatnonzero(self._opponent == opponent))
 
     def _draw(self, count: int) -> Array:
         """Sample the indices of opponents, (count,)."""
@@ -125,8 +133,10 @@ class SelfPlayEnv(SlotEnv):
         worlds = worlds[worlds >= self._mirrored]
         if not len(worlds) or not len(self._scores):
             return
-        seated = self._roster.seated
-        seated[worlds] = self._draw(len(worlds))[:, None]
+        seated, drawn = self._roster.seated, self._draw(len(worlds))
+        self._opponent[worlds] = drawn
+        # All snapshots are one player.
+        seated[worlds] = np.minimum(drawn, self._scripts)[:, None]
         low, high = self._config.opponent_speed_range
         pace = self._rng.uniform(low, high, len(worlds))
         full = self._rng.random(len(worlds)) < 0.5
@@ -139,6 +149,9 @@ class SelfPlayEnv(SlotEnv):
         first = slots + (worlds - self._mirrored) * teammates
         self._seats[first[:, None] + np.arange(teammates)] = mine
         self._roster.begin(worlds)
+        if len(self._pool):
+            member = np.maximum(self._opponent - self._scripts, 0)
+            self._roster.recall(self._scripts, MEMBER, member)
 
     def _restarted(self, worlds: Array, last: StepResult) -> None:
         """Update the scores against opponents at full speed; sample new opponents."""
@@ -146,11 +159,11 @@ class SelfPlayEnv(SlotEnv):
         counted = (worlds >= self._mirrored) & (self._pace[worlds] == 1.0)
         for world in worlds[counted].tolist():
             won = last.success[world, seats]
-            player = self._roster.seated[world].max()
+            opponent = self._opponent[world]
             score = float(won[self._learner[world]])
             if not won.any():
                 score = 1.0 / len(seats)
-            self._scores[player] += SCORE_WEIGHT * (score - self._scores[player])
+            self._scores[opponent] += SCORE_WEIGHT * (score - self._scores[opponent])
         self._begin(worlds)
 
     def _pick(self, rows: Array) -> Array:

@@ -38,16 +38,17 @@ class Roster:
         self.names.append(name)
         return len(self.names) - 1
 
-    def replace(self, player: int, name: str, driver: Driver) -> None:
-        """Replace a player that takes no seat by another one with the same number."""
-        self.add(name, driver)
-        self._seats[player], self.names[player] = self._seats.pop(), self.names.pop()
-
     def begin(self, worlds: Array) -> None:
         """Begin an episode in some worlds, by index (W,), after their reset."""
         seeds, episodes = self.world.seeds, self.world.episode.number
         for player, seat, rows in self._sitting(worlds):
             self._seats[player][seat].reset(rows, seeds, episodes)
+
+    def recall(self, player: int, name: str, values: Array) -> None:
+        """Set the memory of a player at all of its seats to values (B, ...)."""
+        for seat in self._seats[player]:
+            if name in seat.memory:
+                seat.memory[name][:] = values
 
     def ask(self, actions: Array) -> None:
         """Fill the actions of players (B, seats, 2); other seats do not change."""
