@@ -42,8 +42,8 @@ class FreeForAll(ServingScenario):
     becomes a wall and its paddle is removed. The last player wins. If the time limit
     ends the game, the player with most lives wins, and among equals the one with most
     shots on goal. After a goal the puck is served to the player who lost a life. A puck
-    that is held for ``possession`` seconds, or rests out of reach of all paddles, is
-    served to the next player.
+    that is held for ``possession`` seconds, or rests for ``rest`` seconds, is served to
+    the next player.
 
     Start:
         Each paddle is in front of its goal. The puck is served from the centre to one
@@ -53,6 +53,7 @@ class FreeForAll(ServingScenario):
         One player is left.
     """
 
+    version: ClassVar[int] = 1
     title: ClassVar[str] = "Each for themselves"
     announced = ("lives", "shots", "stopped", "scorer", "served", "serve")
     seats: str = "arcade"
@@ -66,8 +67,10 @@ class FreeForAll(ServingScenario):
     """Number of conceded goals after which a player is eliminated."""
     goal_width: Metres = 0.30
     """Width of the goal lines, m."""
-    possession: Seconds = 5.0
+    possession: Seconds = 1.5
     """Largest time for which a player may have the puck within reach, s."""
+    rest: Seconds = 0.5
+    """Largest time for which the puck may be slower than 0.05 m/s, s."""
     shot_weight: Weight = 0.0
     """Reward of a stopped shot on goal, and cost for the player who stopped it."""
     jitter_weight: Weight = 0.0
@@ -132,9 +135,9 @@ class FreeForAll(ServingScenario):
         lives = t.memory["lives"] - lost
         # An eliminated seat holds no puck: a puck at rest in its reach is re-served.
         held = np.where((lives > 0.0)[..., None], rewards.held(self.scene, t), 0.0)
-        lying = rewards.lying(t, held)
+        lying = rewards.resting(t)
         foul = held[..., 0] >= self.possession - 1e-9
-        gone = (lying[..., 0] >= 1.0 - 1e-9) | t.after.lifted[..., 0]
+        gone = (lying[..., 0] >= self.rest - 1e-9) | t.after.lifted[..., 0]
         dead = gone & ~lost.any(-1)
         serve = np.full_like(t.memory["served"], -1.0)
         for side in range(self.sides):

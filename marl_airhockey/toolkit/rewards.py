@@ -202,19 +202,27 @@ def held(scene: Scene, t: Transition) -> Array:
     return np.where(ours, t.memory["held"] + dt, 0.0)
 
 
-def lying(t: Transition, clocks: Array) -> Array:
-    """Return the time for which pucks have rested out of reach (..., pucks), s.
+def resting(t: Transition) -> Array:
+    """Return the time for which pucks have rested (..., pucks), s.
 
     A puck rests if it is slower than 0.05 m/s. The result is the new value of ``lying``
     in the memory.
+    """
+    dt = (t.after.time - t.before.time)[..., None]
+    slow = length(t.after.puck_velocity) < SLOW
+    return np.where(slow, t.memory["lying"] + dt, 0.0)
+
+
+def lying(t: Transition, clocks: Array) -> Array:
+    """Return the time for which pucks have rested out of reach (..., pucks), s.
+
+    The result is the new value of ``lying`` in the memory.
 
     Args:
         t: Transition of one step.
         clocks: Result of `held` for the transition (..., seats, pucks), s.
     """
-    dt = (t.after.time - t.before.time)[..., None]
-    lies = (length(t.after.puck_velocity) < SLOW) & ~(clocks > 0.0).any(-2)
-    return np.where(lies, t.memory["lying"] + dt, 0.0)
+    return np.where((clocks > 0.0).any(-2), 0.0, resting(t))
 
 
 def in_reach(scene: Scene, point: Array) -> Array:

@@ -228,6 +228,20 @@ def test_ladders_have_the_ratings_of_their_files(game):
         assert float(cells[column]) == pytest.approx(float(known["elo"]), abs=0.6)
 
 
+def test_games_go_as_in_their_rows():
+    rows = {(row["game"], row["player"]): row for row in rows_of("stalls.csv")}
+    shown = table("docs/game_results.md", "at rest", "pinned")
+    assert len(shown) == len(rows)
+    for line in shown:
+        row = rows[line["game"], line["player"]]
+        assert line["at rest"] == f"{float(row['rests']):.3f}"
+        assert line["pinned"] == f"{float(row['pinned']):.3f}"
+        assert line["goals per minute"] == f"{float(row['goals_per_minute']):.1f}"
+        serves = float(row["other_serves_per_minute"])
+        assert line["other serves per minute"] == f"{serves:.1f}"
+        assert line["decided"] == f"{float(row['decided']):.2f}"
+
+
 def test_blind_controllers_are_those_of_their_rows():
     rows = {(row["task"], row["profile"]): row for row in rows_of("blind.csv")}
     shown = table("docs/task_results.md", "blind, ideal")

@@ -264,9 +264,30 @@ def test_a_puck_that_rests_before_a_seat_that_is_out_is_served_again(backend):
     rows.puck_velocity[:] = 0.0
     kept["lives"][:, 2] = 0.0
     world.set_state(rows, kept)
-    idle(world, 1.0)
+    idle(world, 0.5)
     np.testing.assert_allclose(world.state.puck[:, 0], 0.0, atol=1e-9)
     assert (np.hypot(*world.state.puck_velocity[:, 0].T) > 0.45).all()
+
+
+@pytest.mark.parametrize(("speed", "seconds"), [(0.0, 0.5), (0.1, 1.5)])
+def test_a_puck_that_rests_or_is_held_goes_to_the_next_player(backend, speed, seconds):
+    world = ah.make_world("free_for_all", 2, backend=backend)
+    world.reset(0)
+    rows, kept = world.get_state()
+    # Along the side of seat 2, which has it within reach.
+    out = world.scene.table.normals[2]
+    rows.puck[:, 0] = -0.25 * out
+    rows.puck_velocity[:, 0] = speed * np.array([-out[1], out[0]])
+    rows.paddle[:, 2] = -0.38 * out
+    kept["held"][:], kept["lying"][:] = 0.0, 0.0
+    kept["served"][:] = 2.0
+    world.set_state(rows, kept)
+    idle(world, seconds - 0.1)
+    assert (np.abs(world.state.puck[:, 0]) > 0.01).any(-1).all()
+    idle(world, 0.1)
+    np.testing.assert_allclose(world.state.puck[:, 0], 0.0, atol=1e-9)
+    away = world.state.puck_velocity[:, 0] @ -world.scene.table.normals[3]
+    assert (away > 0.45).all()
 
 
 def test_a_goal_pays_who_touched_the_puck_last(backend):
