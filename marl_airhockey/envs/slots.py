@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Any, Unpack
+from typing import Any, Protocol, Unpack
 
 import numpy as np
 
@@ -18,6 +18,19 @@ from marl_airhockey.sim.world.observation import Observation
 from marl_airhockey.sim.world.spaces import action_space, observation_space
 from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.types import Array, Memory
+
+
+class SlotMirror(Protocol):
+    """Mirror of the observations and actions of some slots."""
+
+    def begin(self, slots: Array, count: int) -> None:
+        """Choose again in some slots, by index, of ``count`` slots."""
+
+    def observations(self, seen: Array) -> Array:
+        """Return the observations (slots, D) as the slots see them."""
+
+    def actions(self, given: Array) -> Array:
+        """Return the actions (slots, 2) in ego frames for those of the slots."""
 
 
 class SlotEnv:
@@ -59,6 +72,8 @@ class SlotEnv:
         """Function that returns the penalty (slots,), which is subtracted from the
         rewards, for actions (slots, 2), excess over the limits (slots,) and ends of
         episodes (slots,); None for no penalty."""
+        self.mirror: SlotMirror | None = None
+        """Mirror of some slots in training; None for none."""
         self.ended = np.zeros(0, np.int64)
         """Indices of the worlds that restarted in the last step."""
         self._began = time.time()
@@ -88,6 +103,8 @@ class SlotEnv:
         self._returns[:], self._lengths[:] = 0.0, 0
         observation = reset_each(self.world, seed, options)
         self._all_began()
+        if self.mirror is not None:
+            self.mirror.begin(np.arange(self.num_envs), self.num_envs)
         return self.of_slots(observation)
 
     def set_state(
@@ -112,6 +129,8 @@ class SlotEnv:
         given, shape = np.asarray(actions), (self.num_envs, 2)
         if given.shape != shape:
             raise ValueError(f"actions: expected shape {shape}, got {given.shape}")
+        if self.mirror is not None:
+            given = self.mirror.actions(given)
         every = self._of_worlds(given)
         result = self.world.step(every)
         reward = self._pick(result.reward).astype(np.float32)
@@ -131,6 +150,8 @@ class SlotEnv:
             self._fill_infos(infos, np.flatnonzero(done), result)
             self._returns[done], self._lengths[done] = 0.0, 0
             self._restarted(self.ended, result)
+            if self.mirror is not None:
+                self.mirror.begin(np.flatnonzero(done), self.num_envs)
         return self.of_slots(result.observation), reward, done, infos
 
     def _fill_infos(
@@ -158,7 +179,8 @@ class SlotEnv:
     def of_slots(self, observation: Observation) -> Any:
         """Reshape observations (B, seats, ...) to (slots, ...)."""
         if isinstance(observation, np.ndarray):
-            return self._pick(observation)
+            rows = self._pick(observation)
+            return rows if self.mirror is None else self.mirror.observations(rows)
         return {k: self._pick(v) for k, v in observation.items()}
 
     def _of_worlds(self, actions: Array) -> Array:

@@ -10,6 +10,7 @@ from marl_airhockey.envs.slots import SlotEnv
 from marl_airhockey.evaluation.games import teams_of
 from marl_airhockey.learn.action_penalty import ActionPenalty
 from marl_airhockey.learn.device import torch_device
+from marl_airhockey.learn.mirror import Mirror
 from marl_airhockey.learn.self_play_config import SelfPlayConfig
 from marl_airhockey.learn.snapshot_pool import MEMBER, SnapshotPool
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
@@ -199,6 +200,10 @@ def make_training_env(config: SelfPlayConfig, num_worlds: int, pool: Path) -> Sl
         env: SlotEnv = SelfPlayEnv(config, num_worlds, pool)
     else:
         env = SlotEnv(config.scenario, num_worlds, **config.training_keywords)
+    if config.mirrored_share:
+        env.mirror = Mirror(
+            env.world.observer.labels, config.mirrored_share, config.seed
+        )
     weights = config.action_rate_weight, config.action_jerk_weight, config.cost_weight
     if any(weights):
         env.penalty = ActionPenalty(*weights)

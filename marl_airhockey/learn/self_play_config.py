@@ -27,6 +27,7 @@ class SelfPlayConfig(RunConfig):
         "action_rate_weight",
         "action_jerk_weight",
         "cost_weight",
+        "mirrored_share",
         "self_play_fraction",
         "scripted_fraction",
     )
@@ -57,6 +58,9 @@ class SelfPlayConfig(RunConfig):
     none."""
     cost_weight: float = 0.0
     """Weight of ``cost``, the sum of exceeded limits, also subtracted; 0 for none."""
+    mirrored_share: float = 0.0
+    """Share of the episodes in which a player sees and acts as in a mirror at the long
+    axis of the table, 0 to 1; 0.5 is other-play, see `mirror.Mirror`."""
     self_play_fraction: float = 0.5
     """Share of the worlds of a game in which the learner plays all seats, 0 to 1."""
     opponents: list[str] = field(default_factory=lambda: list(OPPONENTS))
@@ -88,7 +92,7 @@ class SelfPlayConfig(RunConfig):
                 f"drivers: self-play needs all seats of {self.scenario!r} open; to "
                 "learn against a driver, give it all seats of the other teams"
             )
-        for name in ("self_play_fraction", "scripted_fraction"):
+        for name in ("mirrored_share", "self_play_fraction", "scripted_fraction"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ValueError(f"{name}: {getattr(self, name)} must be in 0 .. 1")
         speeds = self.opponent_speed_range

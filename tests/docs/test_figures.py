@@ -228,6 +228,32 @@ def test_ladders_have_the_ratings_of_their_files(game):
         assert float(cells[column]) == pytest.approx(float(known["elo"]), abs=0.6)
 
 
+def test_gaps_of_coordination_are_those_of_their_rows():
+    rows = [r for r in rows_of("coordination.csv") if r["game"] == "rally"]
+    shown = {
+        line["method"]: line
+        for line in table("docs/game_results.md", "method", "other seeds")
+    }
+    assert set(shown) == {row["method"] for row in rows}
+    for method, line in shown.items():
+        mine = [row for row in rows if row["method"] == method]
+        scripts = ("striker", "allround")
+        groups = {
+            "with itself": [r for r in mine if r["partner"] == r["seed"]],
+            "other seeds": [
+                r for r in mine if r["partner"] not in (r["seed"], *scripts)
+            ],
+            **{n: [r for r in mine if r["partner"] == n] for n in scripts},
+        }
+        means = {}
+        for name, group in groups.items():
+            means[name] = mean(float(r["return"]) for r in group)
+            share = mean(float(r["success"]) for r in group)
+            assert line[name] == f"{means[name]:.1f} ({share:.2f})"
+        gap = means["with itself"] - means["other seeds"]
+        assert line["gap"].split()[0] == f"{gap:.1f}"
+
+
 def test_games_go_as_in_their_rows():
     rows = {(row["game"], row["player"]): row for row in rows_of("stalls.csv")}
     shown = table("docs/game_results.md", "at rest", "pinned")
