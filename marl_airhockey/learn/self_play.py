@@ -98,11 +98,10 @@ class SelfPlayEnv(SlotEnv):
 
     def _add_opponent(self, path: Path) -> None:
         policy = NumpyPolicy.load(path)
-        if not len(self._pool):
-            self._pool.put(0, policy)
-            self._roster.add("pool", self._pool)
         if len(self._snapshots) < self._config.pool:
             self._pool.put(len(self._snapshots), policy)
+            if not self._snapshots:
+                self._roster.add("pool", self._pool)
             self._scores = np.append(self._scores, 0.5)
             self._snapshots.append(path)
             return

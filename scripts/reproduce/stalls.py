@@ -3,8 +3,8 @@
     python scripts/reproduce/stalls.py
 
 All seats have the same player. A puck rests if it is slower than 0.05 m/s. It is pinned
-if it touches both a paddle and a wall, within 2 mm. Serves after a foul or a rest are
-those that no goal caused.
+if it touches both a paddle and a wall, within 2 mm. It rests in a corner if two walls
+are within 6 cm of it. Serves after a foul or a rest are those that no goal caused.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ PLAYERS = {
     "free_for_all": ("zoo/free_for_all", "allround", "striker", "goalkeeper"),
 }
 """Players by game."""
-GAMES, SEED, NEAR = 200, 7_000_000, 2e-3
-"""Number of games, first seed, and distance of a contact, m."""
+GAMES, SEED, NEAR, CORNER = 200, 7_000_000, 2e-3, 0.06
+"""Number of games, first seed, and distances of a contact and in a corner, m."""
 FIELDS = (
-    *("game", "player", "rests", "pinned", "goals_per_minute"),
+    *("game", "player", "rests", "rests_in_corner", "pinned", "goals_per_minute"),
     *("other_serves_per_minute", "decided"),
 )
 BOOK = Book(DATA / "stalls.csv", FIELDS[:2])
@@ -45,12 +45,14 @@ def measure(game: str, player: str) -> Row:
     world = build_world(game, GAMES, False, {"drivers": drivers})
     world.reset([*range(SEED, SEED + GAMES)])
     live, idle = np.ones(GAMES, bool), np.zeros((GAMES, 0, 2))
-    steps = rests = pinned = serves = goals = decided = 0
+    steps = rests = cornered = pinned = serves = goals = decided = 0
     while live.any():
         conceded = goals_of(world)
         result = world.step(idle)
         steps += live.sum()
-        rests += (live & (speed_of(world) < SLOW)).sum()
+        resting = live & (speed_of(world) < SLOW)
+        rests += resting.sum()
+        cornered += (resting & ((walls_of(world) < CORNER).sum(-1) > 1)).sum()
         pinned += (live & is_pinned(world)).sum()
         serve = world.memory["serve"].reshape(GAMES, -1)
         served = (serve >= 0.0) if game == "free_for_all" else (serve != 0.0)
@@ -61,7 +63,7 @@ def measure(game: str, player: str) -> Row:
     world.close()
     minutes = steps * world.control_dt / 60
     values = (
-        *(rests / steps, pinned / steps, goals / minutes),
+        *(rests / steps, cornered / steps, pinned / steps, goals / minutes),
         *((serves - goals) / minutes, decided / GAMES),
     )
     numbers = (round(float(value), 3) for value in values)
@@ -86,9 +88,15 @@ def is_pinned(world: World) -> Array:
     state, table = world.judged, world.scene.table
     puck = state.puck[:, 0]
     gap = np.linalg.norm(state.paddle - puck[:, None], axis=-1).min(-1)
-    wall = (puck @ table.normals.T + table.offsets).min(-1)
     touches = gap < table.paddle_radius + table.puck_radius + NEAR
-    return np.asarray(touches & (wall < table.puck_radius + NEAR))
+    return np.asarray(touches & (walls_of(world) < NEAR).any(-1))
+
+
+def walls_of(world: World) -> Array:
+    """Return the distances of the puck from the walls before a serve (B, sides), m."""
+    table = world.scene.table
+    distance = world.judged.puck[:, 0] @ table.normals.T + table.offsets
+    return np.asarray(distance - table.puck_radius)
 
 
 def main(

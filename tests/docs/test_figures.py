@@ -261,6 +261,7 @@ def test_games_go_as_in_their_rows():
     for line in shown:
         row = rows[line["game"], line["player"]]
         assert line["at rest"] == f"{float(row['rests']):.3f}"
+        assert line["in corners"] == f"{float(row['rests_in_corner']):.3f}"
         assert line["pinned"] == f"{float(row['pinned']):.3f}"
         assert line["goals per minute"] == f"{float(row['goals_per_minute']):.1f}"
         serves = float(row["other_serves_per_minute"])

@@ -17,6 +17,7 @@ from gymnasium.spaces import Box, Dict
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
 
 import marl_airhockey as ah
+from marl_airhockey.data.exchange.lerobot import STATE
 from marl_airhockey.envs.describe import what
 from marl_airhockey.hardware.calibration.lab_rig import opened_rig
 from marl_airhockey.hardware.rig import Rig
@@ -35,8 +36,6 @@ OBSERVATIONS = {
     "environment_state_agent_pos": ("environment_state", "agent_pos"),
 }
 """Parts of an observation, by type."""
-STATE = ("position", "velocity", "angle", "spin")
-"""Fields of the true state that form ``environment_state``."""
 Vectors = dict[str, dict[int, VectorEnv]]
 """Vector environments by suite and number."""
 

@@ -9,7 +9,9 @@ import numpy as np
 from lerobot.teleoperators import Teleoperator
 
 from lerobot_robot_airhockey.config import AirHockeyDriverConfig
+from lerobot_robot_airhockey.device import VelocityDevice
 from lerobot_robot_airhockey.paddle import AirHockeyPaddle
+from marl_airhockey.policies.policy import Policy
 from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.contracts.driver import View
 from marl_airhockey.sim.core.rng import RandomStreams
@@ -17,7 +19,7 @@ from marl_airhockey.sim.core.rng import RandomStreams
 ONE = np.zeros(1, np.int64)
 
 
-class AirHockeyDriver(Teleoperator):
+class AirHockeyDriver(VelocityDevice, Teleoperator):
     """Driver that moves the paddle which is connected in the same process.
 
     Args:
@@ -35,11 +37,6 @@ class AirHockeyDriver(Teleoperator):
         self._memory: dict[str, Any] | None = None
 
     @property
-    def action_features(self) -> dict[str, type]:
-        """Types of the parts of an action, as of the robot."""
-        return {"x": float, "y": float}
-
-    @property
     def feedback_features(self) -> dict[str, type]:
         """Types of the feedback: there is none."""
         return {}
@@ -49,17 +46,6 @@ class AirHockeyDriver(Teleoperator):
         """True while the driver is open."""
         return self._driver is not None
 
-    @property
-    def is_calibrated(self) -> bool:
-        """True, because nothing is calibrated here."""
-        return True
-
-    def calibrate(self) -> None:
-        """Do nothing: ``airhockey calibrate --hand`` writes the rig of a hand."""
-
-    def configure(self) -> None:
-        """Do nothing: a driver has no further settings."""
-
     def connect(self, calibrate: bool = True) -> None:
         """Open the driver.
 
@@ -68,10 +54,15 @@ class AirHockeyDriver(Teleoperator):
                 observations of a task.
         """
         driver = make_driver(self.config.driver)
+        if isinstance(driver, Policy):
+            self._read(None)
         if driver.erratic or driver.commands_device or driver.measured() is not None:
             raise ValueError(f"driver {self.config.driver!r} cannot move a real arm")
         self._driver = self._open.enter_context(driver)
         self._memory = None
+        # One stream for all steps: a driver must not get the same numbers each time.
+        seeds = np.array([self.config.seed])
+        self._rng = RandomStreams.keyed(seeds, ONE, "lerobot")
 
     def get_action(self) -> dict[str, float]:
         """Return the action of the driver for the robot's last observation.
@@ -83,9 +74,8 @@ class AirHockeyDriver(Teleoperator):
         if self._driver is None or paddle is None:
             raise RuntimeError("airhockey_driver: no airhockey_paddle is connected")
         seat = paddle.scene.seats[0]
-        rng = RandomStreams.keyed(np.array([self.config.seed]), ONE, "lerobot")
         if self._memory is None:
-            self._memory = self._driver.reset(seat, rng, 1)
+            self._memory = self._driver.reset(seat, self._rng, 1)
         view = View(
             scene=paddle.scene,
             state=paddle.state,
@@ -93,7 +83,7 @@ class AirHockeyDriver(Teleoperator):
             labels=(),
             top_speed=np.array([paddle.top_speed]),
             reach=np.asarray(seat.reach),
-            rng=rng,
+            rng=self._rng,
             seat=0,
             control_dt=1.0 / paddle.config.fps,
         )

@@ -12,6 +12,7 @@ from lerobot.robots import Robot
 
 import marl_airhockey as ah
 from lerobot_robot_airhockey.config import AirHockeyPaddleConfig
+from lerobot_robot_airhockey.device import VelocityDevice
 from marl_airhockey.hardware.calibration.lab_rig import opened_rig
 from marl_airhockey.hardware.robot import RobotError
 from marl_airhockey.hardware.table.backend import RealBackend
@@ -36,7 +37,7 @@ FRESH = 1.0
 """Longest time until a new frame arrives after that, s."""
 
 
-class AirHockeyPaddle(Robot):
+class AirHockeyPaddle(VelocityDevice, Robot):
     """Paddle that an arm moves, with the camera over the table.
 
     Actions are ``x`` and ``y``, the target velocity as a fraction of the top speed, -1
@@ -88,11 +89,6 @@ class AirHockeyPaddle(Robot):
         return {**dict.fromkeys(FEATURES, float), **image}
 
     @property
-    def action_features(self) -> dict[str, type]:
-        """Types of the parts of an action."""
-        return {"x": float, "y": float}
-
-    @property
     def cameras(self) -> dict[str, Any]:
         """Cameras by name, whose number LeRobot reads."""
         return {CAMERA: None} if self.config.width else {}
@@ -101,17 +97,6 @@ class AirHockeyPaddle(Robot):
     def is_connected(self) -> bool:
         """True while table and robot are open."""
         return self._env is not None
-
-    @property
-    def is_calibrated(self) -> bool:
-        """True, because the rig has the calibration."""
-        return True
-
-    def calibrate(self) -> None:
-        """Do nothing: ``airhockey calibrate`` writes the rig."""
-
-    def configure(self) -> None:
-        """Do nothing: the rig has all settings."""
 
     def connect(self, calibrate: bool = True) -> None:
         """Open table and robot, and have puck and paddle set up.
@@ -172,18 +157,18 @@ class AirHockeyPaddle(Robot):
             raise RobotError(
                 f"{table.interruption}; inspect the table and connect again"
             )
-        told = table.telemetry()
-        since, self._moment = self._moment, told["moment"]
+        report = table.telemetry()
+        since, self._moment = self._moment, report["moment"]
         numbers = [*state.paddle[0, 0], *state.paddle_velocity[0, 0]]
         puck = np.full(4, np.nan)
         if self.scene.pucks:
             puck[:] = *state.puck[0, 0], *state.puck_velocity[0, 0]
             self._serve_again(puck)
-        numbers += [*np.nan_to_num(puck), *(np.array(told["sent"]) / self.top_speed)]
-        applied = told["applied"] or self._moment
+        numbers += [*np.nan_to_num(puck), *(np.array(report["sent"]) / self.top_speed)]
+        applied = report["applied"] or self._moment
         numbers += [
-            self._moment - told["captured"],
-            told["received"] - told["captured"],
+            self._moment - report["captured"],
+            report["received"] - report["captured"],
             self._moment - applied,
             self._moment - since if since else 0.0,
         ]

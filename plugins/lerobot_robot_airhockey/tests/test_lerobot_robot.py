@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from lerobot.datasets import LeRobotDataset
 from lerobot.robots import make_robot_from_config
-from lerobot_robot_airhockey import AirHockeyPaddleConfig
+from lerobot.teleoperators import make_teleoperator_from_config
+from lerobot_robot_airhockey import AirHockeyDriverConfig, AirHockeyPaddleConfig
 from lerobot_robot_airhockey.paddle import FEATURES
 
 from marl_airhockey.hardware.calibration.lab_rig import running_lab
@@ -97,6 +98,16 @@ def test_a_stop_of_the_arm_ends_the_session(lab):
         robot.disconnect()
         lab.ask("fault", name="protective_stop", on=False)
     assert not robot.is_connected
+
+
+@pytest.mark.parametrize(
+    ("driver", "reason"),
+    [("zoo/juggle", "observations of a task"), ("random", "cannot move a real arm")],
+)
+def test_drivers_that_cannot_move_the_arm_are_refused_at_once(driver, reason):
+    teleop = make_teleoperator_from_config(AirHockeyDriverConfig(driver=driver))
+    with pytest.raises(ValueError, match=reason):
+        teleop.connect()
 
 
 def test_wrong_actions_are_named():
