@@ -21,6 +21,7 @@ class Doubles(Versus):
         A team wins.
     """
 
+    version: ClassVar[int] = 1
     title: ClassVar[str] = "Two on two"
     apart: Metres = 0.24
     """Distance between teammates at the start, m."""

@@ -20,6 +20,7 @@ class Duel(Versus):
         A player wins.
     """
 
+    version: ClassVar[int] = 1
     title: ClassVar[str] = "One on one"
 
     @property

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from marl_airhockey.sim.contracts.scenario import Transition
-from marl_airhockey.sim.core.geometry import length
+from marl_airhockey.sim.core.geometry import length, products
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.seat import reaches
 from marl_airhockey.sim.core.state import State
@@ -21,6 +21,8 @@ SLOW = 0.05
 """Speed below which a puck is at rest, m/s."""
 SHOT = 1.0
 """Speed from which a puck that moves into a goal is a shot, m/s."""
+CORNER = 0.06
+"""Distance of a puck from two walls below which it is in a corner, m."""
 
 
 def tolerance(value: Array, bound: float, margin: float) -> Array:
@@ -213,16 +215,22 @@ def resting(t: Transition) -> Array:
     return np.where(slow, t.memory["lying"] + dt, 0.0)
 
 
-def lying(t: Transition, clocks: Array) -> Array:
-    """Return the time for which pucks have rested out of reach (..., pucks), s.
+def stuck(scene: Scene, t: Transition, clocks: Array) -> Array:
+    """Return the time for which pucks have rested where none can play (..., pucks), s.
 
-    The result is the new value of ``lying`` in the memory.
+    These places are those out of reach, and the corners: no paddle gets behind a puck
+    there. The result is the new value of ``lying`` in the memory.
 
     Args:
+        scene: Scene of the scenario.
         t: Transition of one step.
         clocks: Result of `held` for the transition (..., seats, pucks), s.
     """
-    return np.where((clocks > 0.0).any(-2), 0.0, resting(t))
+    table = scene.table
+    gap = products(t.after.puck, table.normals) + table.offsets - table.puck_radius
+    cornered = (gap < CORNER).sum(-1) > 1
+    playable = (clocks > 0.0).any(-2) & ~cornered
+    return np.where(playable, 0.0, resting(t))
 
 
 def in_reach(scene: Scene, point: Array) -> Array:

@@ -28,8 +28,9 @@ class Versus(ServingScenario):
     equal at the time limit, the team with more shots on goal wins, so that attacking is
     worth more than waiting. After a goal the puck is served from the centre to the team
     that conceded it. A team that has the puck within reach for ``possession`` seconds
-    loses it to the other team. A puck that rests out of reach of all paddles, or that
-    both teams have within reach for ``possession`` seconds, is re-served.
+    loses it to the other team. A puck is re-served if it rests for ``rest`` seconds in a
+    corner or out of reach of all paddles, or if both teams have it within reach for
+    ``possession`` seconds.
     """
 
     announced = ("goals", "stopped", "serve")
@@ -44,6 +45,8 @@ class Versus(ServingScenario):
     """Width of the goal lines, m."""
     possession: Seconds = 5.0
     """Largest time for which a team may have a puck within reach, s."""
+    rest: Seconds = 0.5
+    """Largest time for which a puck may rest where none can play it, s."""
     scored_weight: Weight = 1.0
     """Reward of a goal. A conceded goal gives a reward of -1."""
     shot_weight: Weight = 0.0
@@ -107,12 +110,12 @@ class Versus(ServingScenario):
         home, far = t.after.crossed[..., 0], t.after.crossed[..., 1]
         held = rewards.held(self.scene, t)
         foul = held >= self.possession - 1e-9
-        lying = rewards.lying(t, held)
+        lying = rewards.stuck(self.scene, t, held)
         scored = 1.0 * far - 1.0 * home
         fouled = 1.0 * foul[..., 0, :] - 1.0 * foul[..., -1, :]
         # A goal has priority over a foul in the same step.
         toward = np.where(scored != 0.0, scored, fouled)
-        again = (toward == 0.0) & ((lying >= 1.0 - 1e-9) | t.after.lifted)
+        again = (toward == 0.0) & ((lying >= self.rest - 1e-9) | t.after.lifted)
         # Between two paddles on the middle line both clocks run at the same time.
         again |= foul.all(-2) & (scored == 0.0)
         nearer = np.where(t.after.puck[..., 0] < 0.0, -1.0, 1.0)

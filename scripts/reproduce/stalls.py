@@ -20,7 +20,7 @@ from rows import DATA, Again, Book, Cell, Row, RowsFile, read
 from marl_airhockey.build import build_world
 from marl_airhockey.registry import make_scenario
 from marl_airhockey.sim.world.world import World
-from marl_airhockey.toolkit.rewards import SLOW
+from marl_airhockey.toolkit.rewards import CORNER, SLOW
 from marl_airhockey.types import Array
 
 PLAYERS = {
@@ -29,8 +29,8 @@ PLAYERS = {
     "free_for_all": ("zoo/free_for_all", "allround", "striker", "goalkeeper"),
 }
 """Players by game."""
-GAMES, SEED, NEAR, CORNER = 200, 7_000_000, 2e-3, 0.06
-"""Number of games, first seed, and distances of a contact and in a corner, m."""
+GAMES, SEED, NEAR = 200, 7_000_000, 2e-3
+"""Number of games, first seed, and distance of a contact, m."""
 FIELDS = (
     *("game", "player", "rests", "rests_in_corner", "pinned", "goals_per_minute"),
     *("other_serves_per_minute", "decided"),
