@@ -5,8 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from marl_airhockey.toolkit import Metres
+import numpy as np
+
+from marl_airhockey.toolkit import Array, Metres, Transition, Weight, length
 from marl_airhockey.toolkit.versus import Versus
+
+ROOM = 0.35
+"""Distance of teammates from which they do not crowd each other, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +30,8 @@ class Doubles(Versus):
     title: ClassVar[str] = "Two on two"
     apart: Metres = 0.24
     """Distance between teammates at the start, m."""
+    crowding_weight: Weight = 0.0
+    """Cost per second of teammates in the same place."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -41,6 +48,21 @@ class Doubles(Versus):
         y = self.apart / 2
         # The first seat of each team is on its own left.
         return (0, y), (0, -y), (2, -y), (2, y)
+
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the reward terms.
+
+        goal and shot: as in duel.
+        crowding: ``-crowding_weight`` per second for teammates in the same place,
+        decreasing linearly to 0 at a distance of 0.35 m; only if the weight is not 0.
+        """
+        terms = super().reward_terms(t)
+        if self.crowding_weight:
+            paddle, dt = t.after.paddle, t.after.time - t.before.time
+            apart = length(paddle[..., ::2, :] - paddle[..., 1::2, :])[..., self.teams]
+            crowded = np.maximum(1.0 - apart / ROOM, 0.0)
+            terms["crowding"] = -self.crowding_weight * dt[..., None] * crowded
+        return terms
 
 
 make = Doubles

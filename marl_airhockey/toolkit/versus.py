@@ -28,8 +28,8 @@ class Versus(ServingScenario):
     equal at the time limit, the team with more shots on goal wins, so that attacking is
     worth more than waiting. After a goal the puck is served from the centre to the team
     that conceded it. A team that has the puck within reach for ``possession`` seconds
-    loses it to the other team. A puck is re-served if it rests for ``rest`` seconds in a
-    corner or out of reach of all paddles, or if both teams have it within reach for
+    loses it to the other team. A puck is re-served if it rests for ``rest`` seconds in
+    a corner or out of reach of all paddles, or if both teams have it within reach for
     ``possession`` seconds.
     """
 

@@ -18,7 +18,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from games import cpu_minutes
+from games import cpu_minutes, folder_of, train
 from rich.console import Console
 from rich.table import Table
 from rows import DATA, Again, Book, Cell, Row, RowsFile, read
@@ -26,8 +26,6 @@ from rows import DATA, Again, Book, Cell, Row, RowsFile, read
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import bootstrap
-from marl_airhockey.learn.ppo_config import preset
-from marl_airhockey.learn.train import run_training
 
 METHODS: dict[str, dict[str, Any]] = {
     "self-play": {},
@@ -40,24 +38,15 @@ FIELDS = ("game", "method", "seed", "partner", "return", "success", "cpu_minutes
 BOOK = Book(DATA / "coordination.csv", FIELDS[:4])
 
 
-def folder_of(out: Path, game: str, method: str, seed: object) -> Path:
-    """Return the folder of a run."""
-    return out / f"{game}-{method}-{seed}"
-
-
-def train(out: Path, game: str, method: str, seed: int) -> None:
-    """Train a run, or resume its training."""
-    folder = folder_of(out, game, method, seed)
-    begun = (folder / "config.toml").exists()
-    run_training(
-        None if begun else preset(game, {"seed": seed, **METHODS[method]}), folder
-    )
+def folder_for(out: Path, game: str, method: str, seed: object) -> Path:
+    """Return the folder of a run; those of self-play are the runs of `games.py`."""
+    return folder_of(out, game if method == "self-play" else f"{game}-{method}", seed)
 
 
 def measure(out: Path, game: str, method: str, seed: int, partner: str) -> Row:
     """Return the row of a policy with a partner."""
-    own = folder_of(out, game, method, seed)
-    other = folder_of(out, game, method, partner) / "last.npz"
+    own = folder_for(out, game, method, seed)
+    other = folder_for(out, game, method, partner) / "last.npz"
     found = evaluate(
         ah.load_policy(own / "last.npz"),
         game,
@@ -133,8 +122,13 @@ def main(
     groups = dict.fromkeys(cell[:2] for cell in wanted)
     with ProcessPoolExecutor(jobs) as pool:
         waiting = [
-            pool.submit(train, out, group[0], group[1], seed)
-            for group in groups
+            pool.submit(
+                train,
+                folder_for(out, game, method, seed),
+                game,
+                {"seed": seed, **METHODS[method]},
+            )
+            for game, method in groups
             for seed in range(seeds)
         ]
         for k, done in enumerate(waiting, 1):

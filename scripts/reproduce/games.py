@@ -1,56 +1,58 @@
-"""Train the games with their presets, print scores of the policies, plot curves.
+"""Train the games with several seeds, play against scripts, plot the learning curves.
 
-    python scripts/reproduce/games.py --seeds 3 --jobs 2 --out runs/games
+    python scripts/reproduce/games.py --jobs 2
 
-A run that exists is not trained again. A score is the share of whole games that are
-won, where a draw counts half (a quarter in free_for_all, with four players). Intervals
-are 95 %, and ends alternate. For cooperative games the script prints the mean return of
-an episode and the success, for three kinds of pairs: of one seed, of two seeds, and of
-scripts.
+A run, a curve or a row that exists is not computed again. A score is the share of whole
+games that are won; a draw counts an equal share. Players that are not trained are rows,
+too. In the cooperative games a player has copies of itself as partners, and the row has
+the return and the success of an episode.
 """
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from rich.console import Console
 from rich.table import Table
+from rows import DATA, Again, Book, Cell, Row, RowsFile, read, write
 
-from marl_airhockey.cli.league import SCRIPTS
-from marl_airhockey.evaluation.crossplay import crossplay
-from marl_airhockey.evaluation.games import play_against
-from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.learn.plots import BAND, plot_iqm
+from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.evaluation.games import play_against, teams_of
+from marl_airhockey.evaluation.stats import bootstrap
+from marl_airhockey.learn.plots import plot_iqm
 from marl_airhockey.learn.ppo_config import preset
-from marl_airhockey.learn.self_play_config import OPPONENTS
+from marl_airhockey.learn.self_play_config import EVAL_OPPONENTS
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_driver, make_scenario
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.render.charts import panels, save, series
-from marl_airhockey.sim.world.keywords import Keywords
 
-COOPERATIVE = ("rally", "team_juggle")
-ON_NUMBA: Keywords = {"backend": "numba"}
+OPPONENTS = ("still", *EVAL_OPPONENTS)
+"""Opponents of every player, which are also players that are not trained."""
 GAMES, SEED = 400, 5_000_000
+FIELDS = ("game", "player", "opponent", "score", "return")
+CURVE = ("game", "seed", "measure", "steps", "cpu_minutes", "value")
+BOOK = Book(DATA / "games.csv", FIELDS[:3])
+POINTS, IMAGE = "game_curves.csv", DATA.parent / "images" / "game_curves.png"
 
 
-def train_seed(game: str, seed: int, folder: Path) -> None:
-    """Train one seed, or resume its training."""
+def folder_of(out: Path, game: str, seed: object) -> Path:
+    """Return the folder of a run with the preset."""
+    return out / f"{game}-{seed}"
+
+
+def train(folder: Path, game: str, changes: dict[str, Any]) -> None:
+    """Train a run, or resume its training."""
     begun = (folder / "config.toml").exists()
-    run_training(None if begun else preset(game, {"seed": seed}), folder)
-
-
-def checkpoint(folder: Path, share: float) -> Path:
-    """Return the checkpoint of a run at a share of its training."""
-    paths = sorted((folder / "checkpoints").glob("*.npz"))
-    return paths[round(share * len(paths)) - 1]
+    run_training(None if begun else preset(game, changes), folder)
 
 
 def cpu_minutes(folder: Path) -> float:
@@ -59,107 +61,154 @@ def cpu_minutes(folder: Path) -> float:
         return float(list(csv.DictReader(file))[-1]["cpu_seconds"]) / 60
 
 
-def competitive_table(game: str, folders: Sequence[Path]) -> Table:
-    """Return the scores of each seed against scripts and against its own checkpoint."""
-    names = [*SCRIPTS, "itself at 1/10"]
-    table = Table("against", "in training", *[f"seed {i}" for i in range(len(folders))])
-    columns = []
-    for folder in folders:
-        opponents: list[Driver] = [make_driver(name) for name in SCRIPTS]
-        opponents.append(load_policy(checkpoint(folder, 0.1)))
-        policy = load_policy(folder / "last.npz")
-        score, _ = play_against(game, policy, opponents, GAMES, SEED, ON_NUMBA)
-        columns.append(score)
-    for i, name in enumerate(names):
-        cells = []
-        for score in columns:
-            low, high = interval(float(score[i]), GAMES)
-            cells.append(f"{score[i]:.3f} ({low:.2f}..{high:.2f})")
-        seen = name.removesuffix(":strength=strong") in OPPONENTS
-        table.add_row(name, "yes" if seen else "no", *cells)
-    minutes = [f"{cpu_minutes(folder):.1f}" for folder in folders]
-    table.add_row("CPU-minutes of training", "", *minutes)
+def is_cooperative(game: str) -> bool:
+    """Return True if all seats of a game are in one team."""
+    seats = make_scenario(game).scene.seats
+    return len(set(teams_of([seat.team for seat in seats]))) == 1
+
+
+def cells_of(game: str, seeds: int) -> list[Cell]:
+    """Return the players of a game and their opponents."""
+    players = [*map(str, range(seeds)), *OPPONENTS]
+    if is_cooperative(game):
+        return [(game, player, player) for player in players]
+    return [(game, p, other) for p in players for other in OPPONENTS if p != other]
+
+
+def measure(out: Path, game: str, player: str, opponent: str) -> Row:
+    """Return the row of a player against an opponent, or with copies of itself."""
+
+    def driver() -> Driver:
+        if player in OPPONENTS:
+            return make_driver(player)
+        return load_policy(folder_of(out, game, player) / "last.npz")
+
+    if is_cooperative(game):
+        partners: dict[str, object] = {"paddle_1": driver()}
+        found = evaluate(
+            driver(), game, episodes=GAMES, seed=SEED, exact=True, drivers=partners
+        )
+        numbers = found.success, found.returns
+    else:
+        other = [make_driver(opponent)]
+        score, margin = play_against(game, driver(), other, GAMES, SEED)
+        numbers = float(score[0]), float(margin[0])
+    values = game, player, opponent, round(numbers[0], 4), round(numbers[1], 3)
+    return dict(zip(FIELDS, values, strict=True))
+
+
+def curve_of(out: Path, game: str, seed: int) -> list[Row]:
+    """Return the points of the learning curve of a run."""
+    points = []
+    for row in read(folder_of(out, game, seed) / "evaluations.csv"):
+        names = [n for n in row if n.startswith("score/")] or ["return"]
+        clock = int(float(row["steps"])), round(float(row["cpu_seconds"]) / 60, 3)
+        for name in names:
+            values = game, seed, name, *clock, round(float(row[name]), 4)
+            points.append(dict(zip(CURVE, values, strict=True)))
+    return points
+
+
+def train_all(
+    out: Path, runs: Iterable[tuple[str, int]], points: Path, jobs: int
+) -> None:
+    """Train the runs of games and seeds that have no curve yet; add their curves."""
+    known = {(row["game"], row["seed"]) for row in read(points)}
+    wanted = [(g, s) for g, s in runs if (g, str(s)) not in known]
+    with ProcessPoolExecutor(jobs, max_tasks_per_child=1) as pool:
+        waiting = [
+            pool.submit(train, folder_of(out, game, seed), game, {"seed": seed})
+            for game, seed in wanted
+        ]
+        for k, done in enumerate(waiting):
+            done.result()
+            write(points, read(points) + curve_of(out, *wanted[k]))
+            print(f"{k + 1} of {len(wanted)} runs are finished, in {out}", flush=True)
+
+
+def plot_curves(points: Path, path: Path) -> None:
+    """Plot the learning curves of all games, one panel each, by `plot_iqm`."""
+    rows = read(points)
+    games = list(dict.fromkeys(row["game"] for row in rows))
+    figure, grid = panels(1, len(games), (2.3 * len(games) + 0.6, 3.2))
+    for axes, game in zip(grid[0], games, strict=True):
+        mine = [row for row in rows if row["game"] == game]
+        for k, name in enumerate(dict.fromkeys(row["measure"] for row in mine)):
+            seeds = dict.fromkeys(row["seed"] for row in mine)
+            runs = [
+                [r for r in mine if (r["measure"], r["seed"]) == (name, seed)]
+                for seed in seeds
+            ]
+            length = min(map(len, runs))
+            values, steps = (
+                np.array([[float(r[column]) for r in run[:length]] for run in runs])
+                for column in ("value", "steps")
+            )
+            kind, _, against = name.partition("/")
+            label = f"score against {against}" if against else f"{kind} of a pair"
+            look = series(k if against else len(EVAL_OPPONENTS))
+            plot_iqm(axes, steps.mean(0) / 1e6, values, look, label)
+        axes.set_title(f"{game.replace('_', ' ')}, n = {len(seeds)}", fontsize="small")
+        axes.set(xlabel="steps, millions", xlim=(0, None), ylim=(-0.03, None))
+    save(figure, path)
+
+
+def summary(rows: list[Row]) -> Table:
+    """Return a table of scores, with means over seeds and their 95 % intervals."""
+    table = Table("game", "player", "n", *OPPONENTS, "itself", "return")
+    for game in dict.fromkeys(row["game"] for row in rows):
+        mine = [row for row in rows if row["game"] == game]
+        players = dict.fromkeys(row["player"] for row in mine)
+        trained = [player for player in players if player not in OPPONENTS]
+        groups = {"self-play": trained} | {p: [p] for p in players if p in OPPONENTS}
+        for name, members in groups.items():
+            cells = []
+            for other in (*OPPONENTS, None):
+                found = [
+                    row
+                    for row in mine
+                    if row["player"] in members
+                    and row["opponent"] == (other or row["player"])
+                ]
+                cells.append(shown([float(row["score"]) for row in found]))
+            paid = shown([float(r["return"]) for r in found]) if found else ""
+            table.add_row(game, name, str(len(members)), *cells, paid)
     return table
 
 
-def cooperative_table(game: str, folders: Sequence[Path]) -> Table:
-    """Return returns and success of pairs."""
-    table = Table("pair", "return", "success")
-    players: dict[str, Driver] = {str(f): load_policy(f / "last.npz") for f in folders}
-    scripts = {name: make_driver(name) for name in ("striker", "allround")}
-    learned = crossplay(
-        game, players, episodes=GAMES, seed=SEED, exact=True, **ON_NUMBA
-    )
-    scripted = crossplay(
-        game, scripts, episodes=GAMES, seed=SEED, exact=True, **ON_NUMBA
-    )
-    same = np.eye(len(players), dtype=bool)
-    rows = {
-        "of one seed": (learned.returns[same], learned.success[same]),
-        "of two seeds": (learned.returns[~same], learned.success[~same]),
-    }
-    for i, name in enumerate(scripts):
-        rows[f"two of {name}"] = scripted.returns[i, i], scripted.success[i, i]
-    for name, (returns, success) in rows.items():
-        table.add_row(name, f"{np.mean(returns):.1f}", f"{np.mean(success):.3f}")
-    low, high = learned.gap_interval
-    table.add_row("gap", f"{learned.gaps.mean():.1f} ({low:.1f}..{high:.1f})", "")
-    return table
-
-
-def plot_curves(game: str, folders: Sequence[Path], path: Path) -> None:
-    """Plot scores against opponents over CPU-minutes of training, by `plot_iqm`."""
-    runs = []
-    for folder in folders:
-        with (folder / "evaluations.csv").open() as file:
-            runs.append(list(csv.DictReader(file)))
-    length = min(map(len, runs))
-    names = [key for key in runs[0][0] if key.startswith("score/")]
-    figure, grid = panels(size=(7.2, 4.6))
-    axes = grid[0, 0]
-    cpu = np.mean([[float(r["cpu_seconds"]) for r in x[:length]] for x in runs], 0) / 60
-    for k, name in enumerate(names):
-        share = np.array([[float(r[name]) for r in x[:length]] for x in runs])
-        plot_iqm(axes, cpu, share, series(k), f"against {name.partition('/')[2]}")
-    axes.set(
-        xlabel="CPU-minutes of training",
-        ylabel="score: win + draw / 2",
-        ylim=(-0.03, 1.03),
-        xlim=(0, None),
-    )
-    many = f"{BAND}, n = {len(runs)}" if len(runs) > 1 else "n = 1 seed, no interval"
-    save(figure, path, f"{game.replace('_', ' ')}\n{many}")
+def shown(values: list[float]) -> str:
+    """Return the mean of values, and the interval of several ones."""
+    if not values:
+        return ""
+    digits = 1 if max(values) > 2 else 2
+    mean = f"{np.mean(values):.{digits}f}"
+    if len(values) == 1:
+        return mean
+    low, high = bootstrap(np.array(values), lambda x: float(x.mean()))
+    return f"{mean} ({low:.{digits}f}..{high:.{digits}f})"
 
 
 def main(
     games: Annotated[
         str, typer.Option(help="Names of games, separated by commas.")
-    ] = "duel,rally",
+    ] = "duel,doubles,free_for_all,rally,team_juggle",
     seeds: Annotated[int, typer.Option(help="Number of seeds, from 0.")] = 3,
     jobs: Annotated[int, typer.Option(help="Number of processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs/games"),
+    again: Again = False,
+    rows: RowsFile = None,
 ) -> None:
-    """Train all games, measure the policies, print tables and plot curves."""
-    console, names = Console(), games.split(",")
-    folders = {
-        name: [out / f"{name}-{seed}" for seed in range(seeds)] for name in names
-    }
-    with ProcessPoolExecutor(jobs) as pool:
-        waiting = [
-            pool.submit(train_seed, name, seed, folder)
-            for name, rows in folders.items()
-            for seed, folder in enumerate(rows)
-        ]
-        for k, done in enumerate(waiting, 1):
-            done.result()
-            print(f"{k} of {len(waiting)} runs are finished, in {out}", flush=True)
-    for name, rows in folders.items():
-        console.rule(name)
-        if name in COOPERATIVE:
-            console.print(cooperative_table(name, rows))
-            continue
-        console.print(competitive_table(name, rows))
-        plot_curves(name, rows, out / f"{name}.png")
+    """Train the runs, measure the players that have no row, print table and curves."""
+    book, names = BOOK.at(rows), games.split(",")
+    wanted = book.missing([c for name in names for c in cells_of(name, seeds)], again)
+    if not wanted:
+        return
+    points = book.path.with_name(f"{book.path.stem}_{POINTS}" if rows else POINTS)
+    runs = dict.fromkeys((c[0], int(c[1])) for c in wanted if c[1].isdigit())
+    train_all(out, runs, points, jobs)
+    book.fill(wanted, partial(measure, out), jobs)
+    Console(width=150).print(summary(read(book.path)))
+    plot_curves(points, points.with_suffix(".png") if rows else IMAGE)
 
 
 if __name__ == "__main__":
