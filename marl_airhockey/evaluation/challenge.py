@@ -1,8 +1,8 @@
 """Challenge: a fixed protocol that makes results of different authors comparable.
 
-It has the ten tasks in three profiles and duels against a fixed set of opponents. The
-physics parameters of the tasks are sampled for each episode. A part of the protocol
-that was not played has the score 0.
+It has the ten tasks in three profiles, duels against known opponents, and duels against
+a population of players of different styles. The physics parameters of the tasks are
+sampled for each episode. A part of the protocol that was not played has the score 0.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 from marl_airhockey.evaluation.challenge_report import ChallengeReport, ChallengeResult
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
+from marl_airhockey.evaluation.population import opponents
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.policies.load import ZOO
 from marl_airhockey.registry import make_driver
@@ -85,14 +86,17 @@ def play_challenge(
         report: Function that is called after each result.
 
     Raises:
-        ValueError: No part of the protocol could be played.
+        ValueError: No part of the protocol could be played, or a player of the
+            population is not the published one.
     """
     results, files = [], {}
+    others = {name: name for name in FIELD} | opponents()
     cells = [(t, p, "") for p in PROFILES for t in TASKS]
-    cells += [("duel", "ideal", opponent) for opponent in FIELD]
+    cells += [("duel", "ideal", opponent) for opponent in others]
     for scenario, profile, opponent in cells:
         player = find_player(given, scenario, profile)
-        result = _play(scenario, profile, opponent, player, episodes, games)
+        other = others.get(opponent, "")
+        result = _play(scenario, profile, opponent, other, player, episodes, games)
         if result.player and Path(player).is_file():
             digest = hashlib.sha256(Path(player).read_bytes()).hexdigest()
             files[Path(player).name] = digest
@@ -106,9 +110,15 @@ def play_challenge(
 
 
 def _play(
-    scenario: str, profile: str, opponent: str, player: str, episodes: int, games: int
+    scenario: str,
+    profile: str,
+    opponent: str,
+    other: str,
+    player: str,
+    episodes: int,
+    games: int,
 ) -> ChallengeResult:
-    """Play one task in one profile, or the duel against one opponent."""
+    """Play one task in one profile, or the duel against one opponent, ``other``."""
 
     def missing(note: str) -> ChallengeResult:
         return ChallengeResult(
@@ -121,9 +131,7 @@ def _play(
     try:
         driver = make_driver(player)
         if opponent:
-            found, _ = play_against(
-                scenario, driver, [make_driver(opponent)], games, SEED
-            )
+            found, _ = play_against(scenario, driver, [make_driver(other)], games, SEED)
             score = float(found[0])
             ends = interval(score, games)
             return ChallengeResult(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-PROTOCOL = 2
+PROTOCOL = 3
 """Number of the protocol. It is increased whenever the challenge changes, because cards
 of different protocols are not comparable."""
 
@@ -75,13 +75,18 @@ class ChallengeReport:
 
     @property
     def totals(self) -> dict[str, tuple[float, float, float]]:
-        """Mean scores with intervals: each profile, all tasks, and all duels."""
+        """Mean scores with intervals: each profile, all tasks, and the duels.
+
+        Duels against the population are apart from those against known opponents.
+        """
         found = {}
         for profile in self.profiles:
             in_it = partial(_is_task, profile=profile)
             found[profile] = self.total(in_it)
         found["tasks"] = self.total(lambda r: not r.opponent)
-        found["duel"] = self.total(lambda r: bool(r.opponent))
+        for part, inside in (("duel", False), ("population", True)):
+            those = partial(_is_duel, population=inside)
+            found[part] = self.total(those)
         return found
 
     def to_json(self) -> str:
@@ -154,6 +159,11 @@ class ChallengeReport:
 
 def _is_task(result: ChallengeResult, profile: str) -> bool:
     return not result.opponent and result.profile == profile
+
+
+def _is_duel(result: ChallengeResult, population: bool) -> bool:
+    member = result.opponent.startswith("population/")
+    return bool(result.opponent) and member == population
 
 
 def _share(result: ChallengeResult) -> str:

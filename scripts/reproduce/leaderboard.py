@@ -11,9 +11,10 @@ import typer
 
 from marl_airhockey.evaluation.challenge import FIELD, PROFILES
 from marl_airhockey.evaluation.challenge_report import PROTOCOL, ChallengeReport
+from marl_airhockey.evaluation.population import SHA256
 
 DOCS = Path(__file__).parents[2] / "docs"
-PARTS = (*PROFILES, "tasks", "duel")
+PARTS = (*PROFILES, "tasks", "duel", "population")
 HEAD = f"""# Leaderboard
 
 This page compares policies by a fixed protocol, number {PROTOCOL}.
@@ -22,15 +23,22 @@ This page compares policies by a fixed protocol, number {PROTOCOL}.
 - Tasks: the ten tasks in each of the profiles {", ".join(PROFILES)}.
   In ur5e and gantry, physics and sensing are sampled for each episode.
 - Duels: games against {", ".join(FIELD)}.
+- Population: games against eight players of different styles, see below.
 - A task or game without a policy counts as 0.
 - A card contains the version of the library and the SHA-256 of each policy file, so
   that anyone can measure the policies again. It is not signed.
 
 All values are means with 95 % intervals. The columns with the name of a profile show
 the success in the ten tasks in that profile, and "tasks" the success in all profiles.
-"duel" is the share of won games, in which a draw counts half.
+"duel" and "population" are shares of won games, in which a draw counts half.
 """
-TAIL = """
+TAIL = f"""
+## The population
+
+The eight players were trained with seeds that are published nowhere, so that no policy
+can be trained against copies of them. Please do not train against their files either.
+The SHA-256 of all files is `{SHA256[:16]}...`; the challenge checks it first.
+
 ## Add your policies
 
 1. Put the policies into a folder: `juggle.npz`, `juggle_ur5e.npz`, ..., `duel.npz`.
@@ -47,7 +55,7 @@ def main() -> None:
         path: ChallengeReport.from_json(path.read_text())
         for path in sorted((DOCS / "leaderboard").glob("*.json"))
     }
-    lines = [HEAD, f"| player | {' | '.join(PARTS)} |", "| --- " * 6 + "|"]
+    lines = [HEAD, f"| player | {' | '.join(PARTS)} |", "| --- " * 7 + "|"]
     best_first = sorted(cards.items(), key=lambda item: -item[1].totals["tasks"][0])
     for path, card in best_first:
         shares = [

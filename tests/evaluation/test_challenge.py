@@ -1,21 +1,26 @@
 """The protocol by which players are compared, and its card."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import pytest
 
-from marl_airhockey.evaluation import challenge
+from marl_airhockey.evaluation import challenge, population
 from marl_airhockey.evaluation.challenge import find_player, play_challenge
 from marl_airhockey.evaluation.challenge_report import ChallengeReport
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.registry import make_scenario
 
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch):
-    """Two tasks, two profiles and one opponent."""
+    """Two tasks, two profiles, one opponent and one member of the population."""
     monkeypatch.setattr(challenge, "TASKS", ("reach", "touch"))
     monkeypatch.setattr(challenge, "PROFILES", ("ideal", "ur5e"))
     monkeypatch.setattr(challenge, "FIELD", ("random",))
+    member = str(population.FOLDER / "early.npz")
+    monkeypatch.setattr(challenge, "opponents", lambda: {"population/early": member})
 
 
 def test_the_zoo_has_a_card(tmp_path):
@@ -28,12 +33,14 @@ def test_the_zoo_has_a_card(tmp_path):
         "reach_ur5e.npz",
         "touch_ur5e.npz",
         "duel.npz",
+        "duel.npz",
     ]
     assert set(card.files) == {r.player for r in card.results}
     assert all(r.score >= 0.8 for r in card.results)
     mean, low, high = card.totals["tasks"]
     assert mean == pytest.approx(sum(r.score for r in card.results[:4]) / 4)
     assert low < mean <= high
+    assert card.totals["population"][0] == card.results[-1].score
     files = card.save(tmp_path)
     assert ChallengeReport.from_json(files[0].read_text()) == card
     assert "| reach | ur5e | reach_ur5e.npz | " in files[1].read_text()
@@ -70,3 +77,17 @@ def test_cards_of_other_protocols_are_refused():
         ChallengeReport.from_json(card.to_json())
     with pytest.raises(ValueError, match="not a card"):
         ChallengeReport.from_json(json.dumps({"name": "x"}))
+
+
+def test_the_population_is_the_published_one(tmp_path, monkeypatch):
+    found = population.opponents()
+    assert len(found) == 8
+    for path in found.values():
+        card = NumpyPolicy.load(path).card
+        assert card["version"] == make_scenario("duel").version
+        assert not {"seed", "command"} & set(card)
+    shutil.copytree(population.FOLDER, tmp_path / "changed")
+    monkeypatch.setattr(population, "FOLDER", tmp_path / "changed")
+    (tmp_path / "changed" / "soft.npz").write_bytes(b"another")
+    with pytest.raises(ValueError, match="install marl_airhockey again"):
+        population.opponents()

@@ -47,10 +47,28 @@ def test_holding_the_puck_in_a_duel_is_a_foul_and_a_dead_puck_is_served(backend)
     robots = ah.make_world("duel", 2, backend=backend, seats="robot")
     robots.reset(0)
     place_puck(robots, 0.05, 0.2)
-    idle(robots, 0.95)
+    idle(robots, 0.45)
     np.testing.assert_allclose(robots.state.puck[:, 0], [[0.05, 0.2]] * 2, atol=1e-6)
     idle(robots, 0.05)
     np.testing.assert_allclose(robots.state.puck[:, 0], 0.0)
+
+
+@pytest.mark.parametrize("name", ["duel", "doubles"])
+@pytest.mark.parametrize(("aside", "served"), [(0.04, True), (0.08, False)])
+def test_a_puck_that_rests_in_a_corner_is_served(name, aside, served, backend):
+    world = ah.make_world(name, 2, backend=backend)
+    world.reset(0)
+    length, width = world.scene.table.size
+    inside = world.scene.table.puck_radius + np.array([0.04, aside])
+    corner = np.array([length, width]) / 2.0 - inside
+    place_puck(world, *corner)
+    idle(world, 0.45)
+    np.testing.assert_allclose(world.state.puck[:, 0], [corner] * 2, atol=1e-6)
+    idle(world, 0.05)
+    goes_on = np.allclose(world.state.puck[:, 0], [corner] * 2, atol=1e-6)
+    assert goes_on != served
+    if served:
+        assert (world.state.puck_velocity[:, 0, 0] > 0.45).all()
 
 
 @pytest.mark.parametrize("end", [-1.0, 1.0])

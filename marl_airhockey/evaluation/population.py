@@ -1,0 +1,49 @@
+"""Population of the challenge: players of duel of eight styles, with a known hash.
+
+They were trained with seeds that are published nowhere, so that nobody can train the
+same players. ``scripts/reproduce/population.py`` trains a population of a later
+version.
+"""
+
+from __future__ import annotations
+
+import hashlib
+
+from marl_airhockey.policies.load import ZOO
+
+FOLDER = ZOO / "population"
+"""Folder of the policies, one file for each style."""
+STYLES = (
+    "attacker",
+    "keeper",
+    "banker",
+    "soft",
+    "hasty",
+    "early",
+    "late",
+    "exploiter",
+)
+SHA256 = ""
+"""Result of `digest` for version 1 of the population."""
+
+
+def digest() -> str:
+    """Return the SHA-256 of the files of all styles, in order."""
+    total = hashlib.sha256()
+    for style in STYLES:
+        total.update((FOLDER / f"{style}.npz").read_bytes())
+    return total.hexdigest()
+
+
+def opponents() -> dict[str, str]:
+    """Return the paths of the players by name, such as ``population/attacker``.
+
+    Raises:
+        ValueError: A file is not the published one.
+    """
+    if digest() != SHA256:
+        raise ValueError(
+            f"{FOLDER}: the players are not those of the challenge; install "
+            "marl_airhockey again"
+        )
+    return {f"population/{style}": str(FOLDER / f"{style}.npz") for style in STYLES}
