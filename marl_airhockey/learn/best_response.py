@@ -53,6 +53,7 @@ def best_response(
     else:
         only = {"opponents": [player], "eval_opponents": [player]}
         alone = {"self_play_fraction": 0.0, "scripted_fraction": 1.0, "snapshots": 1}
+        alone |= {"exploiters": 0}
         length = {"total_steps": steps, "seed": seed, "evaluations": 4}
         run_training(preset(scenario, {**only, **alone, **length}), folder, report)
     response, opponents = load_policy(folder / "last.npz"), [make_driver(player)]

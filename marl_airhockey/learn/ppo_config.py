@@ -77,6 +77,8 @@ class PPOConfig(SelfPlayConfig):
             raise ValueError(f"curriculum: {self.curriculum} must be in 0 .. 1")
         if self.curriculum and (self.engine != "torch" or self.self_play):
             raise ValueError("curriculum: only tasks with the engine torch have one")
+        if self.exploiters and (self.engine != "torch" or not self.self_play):
+            raise ValueError("exploiters: only games with the engine torch have them")
         if self.engine == "rllib":
             self._check_rllib()
         elif self.num_env_runners:
@@ -86,6 +88,28 @@ class PPOConfig(SelfPlayConfig):
                 f"batch_size: {self.batch_size} must divide the steps of a rollout, "
                 f"n_steps times the learners in num_worlds worlds, {self.rollout}"
             )
+
+    def exploiter(self, learner: Path, number: int) -> PPOConfig:
+        """Return the configuration of an exploiter.
+
+        Args:
+            learner: Folder of the learner's weights, see `engine.save_weights`.
+            number: Number of the exploiter, from 1.
+        """
+        opponents = [str(learner / "last.npz")]
+        return replace(
+            self,
+            total_steps=int(self.total_steps * self.exploiter_share / self.exploiters),
+            seed=self.seed + 1000 * number,
+            init=str(learner),
+            self_play_fraction=0.0,
+            scripted_fraction=1.0,
+            opponents=opponents,
+            eval_opponents=opponents,
+            snapshots=1,
+            evaluations=1,
+            exploiters=0,
+        )
 
     @staticmethod
     def needs_sb3(observe: str, options: Mapping[str, Any]) -> bool:
@@ -147,6 +171,8 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> PPOConfig
     form = merged.get("observe", "velocity"), merged.get("options", {})
     if PPOConfig.needs_sb3(*form):
         merged = {"engine": "sb3", **merged}
+    if merged.get("engine", "torch") != "torch" and "exploiters" not in changes:
+        merged["exploiters"] = 0
     config = PPOConfig(**{**merged, "scenario": scenario})
     number, each = _evaluations(config, changes)
     return replace(config, evaluations=number, eval_episodes=each)

@@ -73,7 +73,7 @@ class SelfPlayEnv(SlotEnv):
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, np.int64)
         for path in sorted(folder.glob("*.npz")):
-            self._add_opponent(path)
+            self.add_opponent(path)
 
     @property
     def scores(self) -> dict[str, float]:
@@ -83,9 +83,7 @@ class SelfPlayEnv(SlotEnv):
         return dict(zip(names, self._scores.tolist(), strict=True))
 
     def snapshot(self, policy: NumpyPolicy, steps: int) -> None:
-        """Add the current learner to the pool.
-
-        If the pool is full, it replaces the snapshot that the learner beats most often.
+        """Add the current learner to the pool, see `add_opponent`.
 
         Args:
             policy: Policy of the learner.
@@ -94,9 +92,13 @@ class SelfPlayEnv(SlotEnv):
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"{steps:012d}.npz"
         policy.save(path)
-        self._add_opponent(path)
+        self.add_opponent(path)
 
-    def _add_opponent(self, path: Path) -> None:
+    def add_opponent(self, path: Path) -> None:
+        """Add the policy of a file to the pool.
+
+        If the pool is full, it replaces the one that the learner beats most often.
+        """
         policy = NumpyPolicy.load(path)
         if len(self._snapshots) < self._config.pool:
             self._pool.put(len(self._snapshots), policy)

@@ -30,6 +30,7 @@ class SelfPlayConfig(RunConfig):
         "mirrored_share",
         "self_play_fraction",
         "scripted_fraction",
+        "exploiters",
     )
     """Names of the number settings that may be 0."""
     SELF_PLAY: ClassVar[tuple[str, ...]] = (
@@ -38,6 +39,8 @@ class SelfPlayConfig(RunConfig):
         "scripted_fraction",
         "snapshots",
         "pool",
+        "exploiters",
+        "exploiter_share",
         "opponent_sampling_exponent",
         "opponent_speed_range",
         "eval_opponents",
@@ -71,6 +74,11 @@ class SelfPlayConfig(RunConfig):
     """Number of times that the learner is added to the pool of opponents, above 0."""
     pool: int = 16
     """Largest number of snapshots in the pool, above 0."""
+    exploiters: int = 0
+    """Number of exploiters that join the pool. An exploiter starts from the weights of
+    the learner and trains against the learner alone. Only with the engine torch."""
+    exploiter_share: float = 1 / 3
+    """Steps of all exploiters together, divided by ``total_steps``, above 0."""
     opponent_sampling_exponent: float = 2.0
     """Exponent of an opponent's share of won games in its sampling weight, above 0."""
     opponent_speed_range: list[float] = field(default_factory=lambda: [0.1, 1.0])
