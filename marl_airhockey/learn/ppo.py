@@ -41,9 +41,8 @@ from marl_airhockey.policies.policy import policy_driver
 VALUE_WEIGHT = 0.5
 """Weight of the critic's squared error in the loss."""
 MASTERED, FEWEST_EPISODES, WIDER = 0.8, 20, 0.05
-"""Conditions and step of a curriculum. Its ranges of starts widen by `WIDER` if at
-least `FEWEST_EPISODES` episodes of a rollout end with a success of at least
-`MASTERED`."""
+"""Conditions and step of a curriculum: ranges of starts widen by `WIDER` if at least
+`FEWEST_EPISODES` episodes of a rollout end with a success of at least `MASTERED`."""
 
 
 @dataclass
@@ -59,7 +58,7 @@ class Rollout:
     not_done: Tensor
     """0 where an episode ended with the step, else 1."""
     truncated: list[tuple[int, int, Any]]
-    """Step, slot and last observation of the episodes that were truncated."""
+    """Step, slot and last observation of truncated episodes."""
     success: list[bool]
     """Success of the episodes that ended."""
 
@@ -132,8 +131,7 @@ class Trainer:
 
     def _advance(self) -> tuple[int, float]:
         """Play a rollout and learn from it; return the steps so far and the rate."""
-        self._snapshot()
-        self._train_exploiter()
+        self._grow_pool()
         rollout = self._collect()
         steps = self._run.progress.steps + rollout.reward.numel()
         divergence = self._update(rollout, 1.0 - steps / self._config.total_steps)
@@ -153,20 +151,19 @@ class Trainer:
 
     def _collect(self) -> Rollout:
         """Play ``n_steps`` steps of all slots."""
-        config, env, model = self._config, self._env, self.model
-        shape, device = (config.n_steps, env.num_envs), self._device
+        config, env, model, device = self._config, self._env, self.model, self._device
+        shape = config.n_steps, env.num_envs
         reward, not_done = torch.empty(shape), torch.ones(shape)
         rollout = Rollout(
             torch.empty(*shape, len(model.centre), device=device),
             torch.empty(*shape, 2, device=device),
             torch.empty(shape, device=device),
-            reward,
-            not_done,
+            *(reward, not_done),
             truncated=[],
             success=[],
         )
         with torch.inference_mode():
-            spread = torch.exp(model.log_std)
+            spread = model.log_std.exp()
             for t in range(config.n_steps):
                 observation = model.scaled(moved(self._observation, device))
                 rollout.observation[t] = observation
@@ -202,9 +199,8 @@ class Trainer:
                 ends = moved(np.stack(seen), self._device)
                 beyond = model.critic(model.scaled(ends))
                 reward[list(steps), list(slots)] += config.gamma * beyond[:, 0]
-            settings = config.gamma, config.gae_lambda
             advantage = generalized_advantage(
-                reward, value, last, rollout.not_done, *settings
+                reward, value, last, rollout.not_done, config.gamma, config.gae_lambda
             )
             return advantage, advantage + value
 
@@ -260,20 +256,18 @@ class Trainer:
         card = self._config.card(self._env.world.observer.layout.labels)
         return self.model.to_numpy({**card, "steps": self._run.progress.steps})
 
-    def _snapshot(self) -> None:
-        """Add the learner to the pool of opponents if a snapshot is due."""
+    def _grow_pool(self) -> None:
+        """Add a snapshot and an exploiter to the pool of opponents if they are due."""
         env, steps = self._env, self._run.progress.steps
-        if isinstance(env, SelfPlayEnv) and steps >= self._snapshot_due:
+        if not isinstance(env, SelfPlayEnv):
+            return
+        if steps >= self._snapshot_due:
             env.snapshot(self._policy(), steps)
             self._snapshot_due += self._config.total_steps // self._config.snapshots
-
-    def _train_exploiter(self) -> None:
-        """Train an exploiter and add it to the pool of opponents if one is due."""
         if (run := self._exploiters.due(self._save_in)) is not None:
             with torch.random.fork_rng():
                 Trainer(run).train()
-            assert isinstance(self._env, SelfPlayEnv)
-            self._env.add_opponent(self._exploiters.join(run))
+            env.add_opponent(self._exploiters.join(run))
 
     def _evaluate(self) -> Metrics:
         """Evaluate and save the policy; return the row of the evaluation."""

@@ -1,6 +1,7 @@
 """Learning against others and earlier selves."""
 
 import numpy as np
+import pytest
 from runs import SMALL, rows
 
 import marl_airhockey as ah
@@ -109,3 +110,28 @@ def test_self_play_trains_resumes_and_keeps_its_past(tmp_path):
     (folder / "config.toml").write_text(text)
     assert run_training(None, folder)["steps"] > last["steps"]
     assert find_policies(tmp_path) == [folder]
+
+
+def test_exploiters_learn_to_beat_the_learner_and_join_its_opponents(tmp_path):
+    folder = tmp_path / "run"
+    config = preset("duel", {**GAME, "exploiters": 2, "pool": 8})
+    run_training(config, folder)
+    assert len(list(folder.glob("pool/*-exploiter.npz"))) == 2
+    for number in (1, 2):
+        run = folder / "exploiters" / str(number)
+        learner = run / "learner" / "last.npz"
+        (row,) = rows(run)
+        assert int(float(row["steps"])) >= config.total_steps / 6
+        assert f"score/{learner}" in row, "it plays against the learner only"
+        weights = [
+            load_policy(path).predict.layers[0][0]
+            for path in (learner, run / "last.npz")
+        ]
+        assert np.abs(weights[0] - weights[1]).max() > 0.0
+        # It begins with the weights of the learner.
+        assert np.abs(weights[0] - weights[1]).max() < 0.3
+    assert preset("duel", {"engine": "sb3"}).exploiters == 0
+    with pytest.raises(ValueError, match="exploiters: only games"):
+        preset("duel", {"engine": "sb3", "exploiters": 2})
+    with pytest.raises(ValueError, match="exploiters: only games"):
+        preset("reach", {"exploiters": 2})
