@@ -18,7 +18,8 @@ from typing import Annotated, Any
 
 import typer
 from games import train
-from reaction import play
+from reaction import USUAL
+from reaction import measure as duels
 from rich.console import Console
 from rich.table import Table
 from rows import DATA, Again, Book, Row, RowsFile, read
@@ -28,7 +29,7 @@ from marl_airhockey.evaluation.population import FOLDER, STYLES, digest
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.registry import find_scenario, make_driver
 
-SIZE = {"hidden": [64, 64], "evaluations": 2}
+SIZE = {"hidden": [64, 64], "evaluations": 2, "exploiters": 0}
 REWARDS = "training_options"
 CHANGES: dict[str, dict[str, Any]] = {
     "attacker": {REWARDS: {"shot_weight": 0.3, "scored_weight": 2.0}},
@@ -43,7 +44,8 @@ CHANGES: dict[str, dict[str, Any]] = {
 """Changes of the preset by style. The exploiter trains against the late player only."""
 STEPS, GAMES, SEED = 8_000_000, 400, 8_000_000
 FIELDS = (
-    *("style", "score", "goals", "goals_per_minute", "goals_per_shot", "bank_shots"),
+    *("style", "score", "home_goals", "far_goals", "goals_per_minute"),
+    *("goals_per_shot", "bank_shots"),
 )
 BOOK = Book(DATA / "population.csv", FIELDS[:1])
 
@@ -76,8 +78,9 @@ def measure(style: str) -> Row:
     score, _ = play_against(
         "duel", make_driver(path), [make_driver("zoo/duel")], GAMES, SEED
     )
-    _, _, *cells = play(path, "zoo/duel", 0.15, GAMES, 0.05, 0.30)
-    return dict(zip(FIELDS, (style, round(float(score[0]), 3), *cells), strict=True))
+    played = duels(USUAL, path, "zoo/duel", GAMES)
+    row = {"style": style, "score": round(float(score[0]), 3)}
+    return row | {name: played[name] for name in FIELDS[2:]}
 
 
 def main(
