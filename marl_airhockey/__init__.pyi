@@ -23,5 +23,5 @@ from .rollouts.rollout import rollout as rollout
 
 __version__: str
 
-# Type checkers do not use the finder of `from marl_airhockey import duel_v0`.
+# Type checkers do not use the finder of `from marl_airhockey import duel_v1`.
 def __getattr__(name: str) -> types.ModuleType: ...

@@ -1,4 +1,4 @@
-"""Modules of games as in PettingZoo: ``from marl_airhockey import duel_v0``."""
+"""Modules of games as in PettingZoo: ``from marl_airhockey import duel_v1``."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ VERSIONED = re.compile(r"([a-z]\w*)_v(\d+)")
 
 
 class GameFinder(MetaPathFinder, Loader):
-    """Finder of modules of games, for ``duel_v0.parallel_env()``.
+    """Finder of modules of games, for ``duel_v1.parallel_env()``.
 
-    Both ``from marl_airhockey import duel_v0`` and ``import marl_airhockey.duel_v0``
+    Both ``from marl_airhockey import duel_v1`` and ``import marl_airhockey.duel_v1``
     use it.
     """
 

@@ -1,8 +1,7 @@
 """Population of the challenge: players of duel of eight styles, with a known hash.
 
-They were trained with seeds that are published nowhere, so that nobody can train the
-same players. ``scripts/reproduce/population.py`` trains a population of a later
-version.
+Their seeds are published nowhere, so that these players cannot be trained again.
+``scripts/reproduce/population.py`` trains a population of a later version.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ STYLES = (
     "late",
     "exploiter",
 )
-SHA256 = ""
+SHA256 = "cea09e02183dbec2afc9cbcf9e453eabfe6d939217b298202a9409a7c73309bf"
 """Result of `digest` for version 1 of the population."""
 
 

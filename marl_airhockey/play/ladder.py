@@ -27,7 +27,7 @@ CHAMPION = 0
 """Number of the best policy of a game; the numbers of others are in their names."""
 RUNGS = (
     ("gentle", 1, Handicap(reaction=0.05, noise=0.01, pace=0.45)),
-    ("level 1", 1, Handicap(reaction=0.05, noise=0.005, pace=0.7)),
+    ("level 1", 1, Handicap(reaction=0.05, noise=0.005, pace=0.6)),
     ("champion at human speed", CHAMPION, Handicap(0.05, noise=0.012, pace=0.55)),
     ("level 2", 3, Handicap(reaction=0.05)),
     ("level 3", 4, Handicap(reaction=0.05)),

@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import typer
+from rows import DATA, read
 
 from marl_airhockey.evaluation.challenge import FIELD, PROFILES
 from marl_airhockey.evaluation.challenge_report import PROTOCOL, ChallengeReport
@@ -37,7 +38,16 @@ TAIL = f"""
 
 The eight players were trained with seeds that are published nowhere, so that no policy
 can be trained against copies of them. Please do not train against their files either.
-The SHA-256 of all files is `{SHA256[:16]}...`; the challenge checks it first.
+The SHA-256 of all files is checked first:
+
+    {SHA256}
+
+STYLES
+
+    python scripts/reproduce/population.py
+
+This prints the styles in games against zoo/duel. Bank shots are the share of the goals
+after a wall bounce.
 
 ## Add your policies
 
@@ -64,7 +74,25 @@ def main() -> None:
         ]
         name = f"[{card.name}](leaderboard/{path.name})"
         lines.append(f"| {name} | {' | '.join(shares)} |")
-    (DOCS / "leaderboard.md").write_text("\n".join([*lines, TAIL]))
+    tail = TAIL.replace("STYLES", "\n".join(styles()))
+    (DOCS / "leaderboard.md").write_text("\n".join([*lines, tail]))
+
+
+def styles() -> list[str]:
+    """Return the table of the styles of the population."""
+    lines = [
+        "| style | score | goals | goals per minute | bank shots |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for row in read(DATA / "population.csv"):
+        goals = f"{float(row['home_goals']):.1f} : {float(row['far_goals']):.1f}"
+        numbers = (
+            f"{float(row['goals_per_minute']):.1f}",
+            f"{float(row['bank_shots']):.2f}",
+        )
+        cells = row["style"], f"{float(row['score']):.2f}", goals, *numbers
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ import torch
 import typer
 from stable_baselines3 import PPO
 
-from marl_airhockey import duel_v0
+from marl_airhockey import duel_v1
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.registry import make_driver
 
@@ -32,7 +32,7 @@ def make_vec_env(copies: int) -> Any:
         # SuperSuit uses names that gymnasium has deprecated.
         warnings.simplefilter("ignore")
         import supersuit
-    env = duel_v0.parallel_env(options={"seconds": 20.0})
+    env = duel_v1.parallel_env(options={"seconds": 20.0})
     slots = supersuit.pettingzoo_env_to_vec_env_v1(env)
     base = "stable_baselines3"
     return supersuit.concat_vec_envs_v1(slots, copies, num_cpus=0, base_class=base)
@@ -40,7 +40,7 @@ def make_vec_env(copies: int) -> Any:
 
 def watch(model: PPO, seed: int) -> dict[str, float]:
     """Play a game and return the sum of rewards of each agent."""
-    env = duel_v0.env(options={"seconds": 20.0})
+    env = duel_v1.env(options={"seconds": 20.0})
     env.reset(seed=seed)
     rewards = dict.fromkeys(env.possible_agents, 0.0)
     for agent in env.agent_iter():

@@ -254,6 +254,40 @@ def test_gaps_of_coordination_are_those_of_their_rows():
         assert line["gap"].split()[0] == f"{gap:.1f}"
 
 
+def test_best_responses_are_those_of_their_rows():
+    rows = sorted(rows_of("exploitability.csv"), key=lambda row: row["response_seed"])
+    scores = [f"{float(row['score']):.2f}" for row in rows]
+    text = " ".join((ROOT / "docs/game_results.md").read_text().split())
+    assert f"score {', '.join(scores[:-1])} and {scores[-1]} in 400 games" in text
+
+
+def test_duels_are_those_of_their_rows():
+    rows = {
+        (float(row["reaction"]), row["home"], row["far"]): row
+        for row in rows_of("reaction.csv")
+    }
+    for line in table("docs/game_results.md", "opponent", "bank shots"):
+        row = rows.pop((0.15, "zoo/duel", line["opponent"]))
+        goals = f"{float(row['home_goals']):.1f} : {float(row['far_goals']):.1f}"
+        assert line["level games"] == f"{float(row['level']):.2f}"
+        assert line["goals"] == goals
+        assert line["goals per minute"] == f"{float(row['goals_per_minute']):.1f}"
+        assert line["goals per shot"] == f"{float(row['goals_per_shot']):.2f}"
+        assert line["bank shots"] == f"{float(row['bank_shots']):.2f}"
+    (found,) = [t for t in tables("docs/game_results.md") if t[0][0] == "latency, s"]
+    for latency, *cells in found[1]:
+        for k, pair in enumerate(
+            (("allround", "goalkeeper"), ("striker", "goalkeeper"), ("allround",) * 2)
+        ):
+            row = rows.pop((float(latency), *pair))
+            shown = (
+                f"{float(row['level']):.2f}",
+                f"{float(row['goals_per_minute']):.1f}",
+            )
+            assert tuple(cells[2 * k : 2 * k + 2]) == shown
+    assert not rows
+
+
 def test_games_go_as_in_their_rows():
     rows = {(row["game"], row["player"]): row for row in rows_of("stalls.csv")}
     shown = table("docs/game_results.md", "at rest", "pinned")

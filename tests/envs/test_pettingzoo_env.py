@@ -32,7 +32,7 @@ def test_keywords_pass_through_pettingzoos_registry():
     env = pettingzoo.make("parallel", "marl_airhockey/duel", drivers=drivers)
     assert env.possible_agents == ["paddle_0"]
     with pytest.raises(ValueError, match="unknown"):
-        pettingzoo.make("aec", "marl_airhockey/duel-v0", driver=drivers)
+        pettingzoo.make("aec", "marl_airhockey/duel-v1", driver=drivers)
 
 
 def test_a_driven_seat_makes_it_a_single_agent_environment():
@@ -85,17 +85,17 @@ def test_the_state_holds_what_the_scenario_remembers(name):
 
 
 def test_games_are_imported_as_those_of_pettingzoo():
-    from marl_airhockey import duel_v0
+    from marl_airhockey import duel_v1
 
-    assert duel_v0.parallel_env(max_cycles=7).max_cycles == 7
-    max_cycles_test(duel_v0)
-    with pytest.raises(ImportError, match="contains duel_v0"):
+    assert duel_v1.parallel_env(max_cycles=7).max_cycles == 7
+    max_cycles_test(duel_v1)
+    with pytest.raises(ImportError, match="contains duel_v1"):
         from marl_airhockey import duel_v7  # noqa: F401
     rally = importlib.import_module("marl_airhockey.rally_v0")
     assert rally.parallel_env().possible_agents == ["paddle_0", "paddle_1"]
     for wrong in ("marl_airhockey.dule_v0", "marl_airhockey.nothing"):
         with pytest.raises(ModuleNotFoundError):
             importlib.import_module(wrong)
-    with pytest.raises(ImportError, match="contains duel_v0"):
+    with pytest.raises(ImportError, match="contains duel_v1"):
         importlib.import_module("marl_airhockey.duel_v3")
     assert not hasattr(ah, "duell_v0")

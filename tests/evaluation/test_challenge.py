@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -83,7 +84,7 @@ def test_the_population_is_the_published_one(tmp_path, monkeypatch):
     found = population.opponents()
     assert len(found) == 8
     for path in found.values():
-        card = NumpyPolicy.load(path).card
+        card = NumpyPolicy.load(Path(path)).card
         assert card["version"] == make_scenario("duel").version
         assert not {"seed", "command"} & set(card)
     shutil.copytree(population.FOLDER, tmp_path / "changed")
