@@ -171,7 +171,8 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> PPOConfig
     form = merged.get("observe", "velocity"), merged.get("options", {})
     if PPOConfig.needs_sb3(*form):
         merged = {"engine": "sb3", **merged}
-    if merged.get("engine", "torch") != "torch" and "exploiters" not in changes:
+    alone = merged.get("drivers") or merged.get("engine", "torch") != "torch"
+    if alone and "exploiters" not in changes:
         merged["exploiters"] = 0
     config = PPOConfig(**{**merged, "scenario": scenario})
     number, each = _evaluations(config, changes)

@@ -131,6 +131,7 @@ def test_exploiters_learn_to_beat_the_learner_and_join_its_opponents(tmp_path):
         # It begins with the weights of the learner.
         assert np.abs(weights[0] - weights[1]).max() < 0.3
     assert preset("duel", {"engine": "sb3"}).exploiters == 0
+    assert preset("duel", {"drivers": {"paddle_1": "striker"}}).exploiters == 0
     with pytest.raises(ValueError, match="exploiters: only games"):
         preset("duel", {"engine": "sb3", "exploiters": 2})
     with pytest.raises(ValueError, match="exploiters: only games"):
