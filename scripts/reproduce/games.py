@@ -153,27 +153,30 @@ def plot_curves(points: Path, path: Path) -> None:
     save(figure, path)
 
 
-def summary(rows: list[Row]) -> Table:
-    """Return a table of scores, with means over seeds and their 95 % intervals."""
-    table = Table("game", "player", "n", *OPPONENTS, "itself", "return")
+COLUMNS = ("game", "player", "n", *OPPONENTS, "copies of itself", "return")
+
+
+def summary(rows: list[Row]) -> list[list[str]]:
+    """Return the lines of the table: means over seeds and their 95 % intervals."""
+    lines = []
     for game in dict.fromkeys(row["game"] for row in rows):
         mine = [row for row in rows if row["game"] == game]
         players = dict.fromkeys(row["player"] for row in mine)
         trained = [player for player in players if player not in OPPONENTS]
         groups = {"self-play": trained} | {p: [p] for p in players if p in OPPONENTS}
         for name, members in groups.items():
-            cells = []
+            line = [game, name, str(len(members))]
             for other in (*OPPONENTS, None):
                 found = [
                     row
                     for row in mine
                     if row["player"] in members
                     and row["opponent"] == (other or row["player"])
+                    and (other is None) == is_cooperative(game)
                 ]
-                cells.append(shown([float(row["score"]) for row in found]))
-            paid = shown([float(r["return"]) for r in found]) if found else ""
-            table.add_row(game, name, str(len(members)), *cells, paid)
-    return table
+                line.append(shown([float(row["score"]) for row in found]))
+            lines.append([*line, shown([float(row["return"]) for row in found])])
+    return lines
 
 
 def shown(values: list[float]) -> str:
@@ -207,7 +210,10 @@ def main(
     runs = dict.fromkeys((c[0], int(c[1])) for c in wanted if c[1].isdigit())
     train_all(out, runs, points, jobs)
     book.fill(wanted, partial(measure, out), jobs)
-    Console(width=150).print(summary(read(book.path)))
+    table = Table(*COLUMNS)
+    for line in summary(read(book.path)):
+        table.add_row(*line)
+    Console(width=160).print(table)
     plot_curves(points, points.with_suffix(".png") if rows else IMAGE)
 
 

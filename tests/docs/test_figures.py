@@ -254,6 +254,22 @@ def test_gaps_of_coordination_are_those_of_their_rows():
         assert line["gap"].split()[0] == f"{gap:.1f}"
 
 
+def test_scores_of_games_are_those_of_their_rows():
+    games = script("reproduce/games.py")
+    columns = games["COLUMNS"]
+    lines = games["summary"](rows_of("games.csv"))
+    known = {tuple(line[:2]): dict(zip(columns, line, strict=True)) for line in lines}
+    shown = [
+        line
+        for titles in (("game", "player", "allround"), ("game", "player", "return"))
+        for line in table("docs/game_results.md", *titles)
+    ]
+    for line in shown:
+        row = known.pop((line["game"], line["player"]))
+        assert line == {title: row[title] or "-" for title in line}
+    assert not known
+
+
 def test_best_responses_are_those_of_their_rows():
     rows = sorted(rows_of("exploitability.csv"), key=lambda row: row["response_seed"])
     scores = [f"{float(row['score']):.2f}" for row in rows]
