@@ -92,3 +92,6 @@ def test_the_population_is_the_published_one(tmp_path, monkeypatch):
     (tmp_path / "changed" / "soft.npz").write_bytes(b"another")
     with pytest.raises(ValueError, match="install marl_airhockey again"):
         population.opponents()
+    (tmp_path / "changed" / "soft.npz").unlink()
+    with pytest.raises(ValueError, match="install marl_airhockey again"):
+        population.opponents()
