@@ -1,4 +1,4 @@
-"""Train MAPPO and IPPO of BenchMARL on the games with teams; print a table.
+"""Train MAPPO, IPPO and MADDPG of BenchMARL on the games with teams; print a table.
 
     python -m venv .venv-benchmarl
     .venv-benchmarl/bin/pip install 'benchmarl==1.5.2' -e . plugins/benchmarl_airhockey
@@ -9,12 +9,10 @@ BenchMARL 1.5 needs a TorchRL below 0.12, and the extra ``ecosystem`` needs a la
 It therefore has a separate environment. BenchMARL is not modified. The tasks are those
 of the package `plugins/benchmarl_airhockey`, which steps all worlds in one call.
 
-All policies of a team share a network. The critic of MAPPO observes the true state.
-Worlds, batches, networks, the learning rate and rewards in training are those of the
-presets. In doubles the
-team plays against two goalkeepers. A finished run adds a row to ``docs/data/marl.csv``.
-A run that has a row is not trained again. The final policy is measured by its most
-likely actions, over episodes that training does not use.
+All policies of a team share a network. The critics of MAPPO and MADDPG observe the true
+state. In doubles the team plays against two goalkeepers. A finished run adds a row to
+``docs/data/marl.csv``. A run that has a row is not trained again. The final policy is
+measured by its most likely actions, over episodes that training does not use.
 """
 
 from __future__ import annotations
@@ -26,7 +24,7 @@ from typing import Annotated
 
 import torch
 import typer
-from benchmarl.algorithms import IppoConfig, MappoConfig
+from benchmarl.algorithms import IppoConfig, MaddpgConfig, MappoConfig
 from benchmarl.experiment import Experiment, ExperimentConfig
 from benchmarl.models.mlp import MlpConfig
 from benchmarl_airhockey import AirHockeyTask
@@ -37,41 +35,33 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
-from marl_airhockey.learn.ppo_config import PPOConfig, preset
 
-ALGORITHMS = {"mappo": MappoConfig, "ippo": IppoConfig}
+ALGORITHMS = {"mappo": MappoConfig, "ippo": IppoConfig, "maddpg": MaddpgConfig}
 GAMES = {
     "rally": {},
     "team_juggle": {},
     "doubles": dict.fromkeys(("paddle_2", "paddle_3"), "goalkeeper"),
 }
 """Drivers of the other team, by game."""
-SHARES = {"rally": 1.0, "team_juggle": 1.0, "doubles": 0.25}
-"""Steps of all players in training, divided by those of the preset."""
 SCRIPTS = ("striker", "allround")
 """Drivers that are measured for comparison."""
-EPISODES = 500
+WORLDS, EPISODES = 100, 500
 FIELDS = ("game", "policy", "seed", "frames", "success", "team_return", "cpu_minutes")
 BOOK = Book(DATA / "marl.csv", FIELDS[:3])
 
 
-def network(own: PPOConfig) -> MlpConfig:
-    """Return a network of the size of a preset."""
-    config = MlpConfig.get_from_yaml()
-    config.num_cells, config.activation_class = list(own.hidden), torch.nn.ReLU
-    return config
-
-
-def settings(own: PPOConfig, share: float) -> ExperimentConfig:
-    """Return the settings of all runs: one core, no logs, no files."""
-    steps_of_worlds = own.total_steps * own.num_worlds / own.slots
+def settings(frames: int) -> ExperimentConfig:
+    """Return the settings of all runs: one core, 100 worlds, no logs, no files."""
     config = ExperimentConfig.get_from_yaml()
-    config.lr, config.share_policy_params = own.learning_rate, True
-    config.on_policy_n_envs_per_worker = own.num_worlds
-    config.on_policy_collected_frames_per_batch = own.n_steps * own.num_worlds
-    config.on_policy_n_minibatch_iters = own.n_epochs
-    config.on_policy_minibatch_size = own.batch_size
-    config.max_n_frames, config.max_n_iters = round(share * steps_of_worlds), None
+    config.lr, config.share_policy_params = 3e-4, True
+    config.on_policy_n_envs_per_worker = config.off_policy_n_envs_per_worker = WORLDS
+    config.on_policy_collected_frames_per_batch = 100 * WORLDS
+    config.on_policy_n_minibatch_iters, config.on_policy_minibatch_size = 10, 1000
+    config.off_policy_collected_frames_per_batch = 20 * WORLDS
+    config.off_policy_n_optimizer_steps = 100
+    config.off_policy_train_batch_size = 256
+    config.off_policy_init_random_frames = 100 * WORLDS
+    config.max_n_frames, config.max_n_iters = frames, None
     config.evaluation, config.loggers, config.create_json = False, [], False
     config.save_folder = tempfile.mkdtemp()
     return config
@@ -95,21 +85,19 @@ def measure(experiment: Experiment, game: str) -> tuple[float, float]:
     return float(succeeded.float().mean()), float(paid.mean())
 
 
-def train_cell(game: str, algorithm: str, seed: int) -> Row:
+def train_cell(game: str, algorithm: str, seed: int, frames: int) -> Row:
     """Train one policy and return its row."""
     began = time.process_time()
     task = AirHockeyTask[game.upper()].get_from_yaml()
-    own = preset(game)
-    task.config |= own.training_options
     if GAMES[game]:
         task.config["opponent"] = "goalkeeper"
     experiment = Experiment(
         task=task,
         algorithm_config=ALGORITHMS[algorithm].get_from_yaml(),
-        model_config=network(own),
-        critic_model_config=network(own),
+        model_config=MlpConfig.get_from_yaml(),
+        critic_model_config=MlpConfig.get_from_yaml(),
         seed=seed,
-        config=settings(own, SHARES[game]),
+        config=settings(frames),
     )
     experiment.run()
     minutes = (time.process_time() - began) / 60
@@ -158,6 +146,9 @@ def main(
         list[str] | None, typer.Argument(help="Names of games; by default all.")
     ] = None,
     seeds: Annotated[int, typer.Option(help="Number of runs of each algorithm.")] = 3,
+    frames: Annotated[
+        int, typer.Option(help="Number of steps of a run, summed over all worlds.")
+    ] = 500_000,
     again: Again = False,
     rows: RowsFile = None,
 ) -> None:
@@ -174,7 +165,11 @@ def main(
     ]
     for game, policy, seed in book.missing(cells, again):
         scripted = policy in SCRIPTS
-        row = play_script(game, policy) if scripted else train_cell(game, policy, seed)
+        row = (
+            play_script(game, policy)
+            if scripted
+            else train_cell(game, policy, seed, frames)
+        )
         row |= {k: round(v, 4) for k, v in row.items() if isinstance(v, float)}
         book.keep(row)
         print(row, flush=True)
