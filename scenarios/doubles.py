@@ -31,7 +31,7 @@ class Doubles(Versus):
     apart: Metres = 0.24
     """Distance between teammates at the start, m."""
     crowding_weight: Weight = 0.0
-    """Cost per second of teammates in the same place."""
+    """Cost per second of teammates at the same position."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -53,7 +53,7 @@ class Doubles(Versus):
         """Return the reward terms.
 
         goal and shot: as in duel.
-        crowding: ``-crowding_weight`` per second for teammates in the same place,
+        crowding: ``-crowding_weight`` per second for teammates at the same position,
         decreasing linearly to 0 at a distance of 0.35 m; only if the weight is not 0.
         """
         terms = super().reward_terms(t)

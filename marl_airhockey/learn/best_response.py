@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from marl_airhockey.evaluation.games import play_against
-from marl_airhockey.learn.ppo_config import PPOConfig, preset
+from marl_airhockey.learn.ppo_config import PPOConfig, only_against, preset
 from marl_airhockey.learn.run import ProgressCallback
 from marl_airhockey.learn.settings import load_config
 from marl_airhockey.learn.train import run_training
@@ -51,11 +51,9 @@ def best_response(
     if (folder / "state.json").exists():
         load_config(PPOConfig, folder / "config.toml")
     else:
-        only = {"opponents": [player], "eval_opponents": [player]}
-        alone = {"self_play_fraction": 0.0, "scripted_fraction": 1.0, "snapshots": 1}
-        alone |= {"exploiters": 0}
         length = {"total_steps": steps, "seed": seed, "evaluations": 4}
-        run_training(preset(scenario, {**only, **alone, **length}), folder, report)
+        config = preset(scenario, {**only_against(player), **length})
+        run_training(config, folder, report)
     response, opponents = load_policy(folder / "last.npz"), [make_driver(player)]
     keywords: Keywords = {"backend": "numba"}
     score, _ = play_against(scenario, response, opponents, GAMES, SEED, keywords)

@@ -96,19 +96,13 @@ class PPOConfig(SelfPlayConfig):
             learner: Folder of the learner's weights, see `engine.save_weights`.
             number: Number of the exploiter, from 1.
         """
-        opponents = [str(learner / "last.npz")]
         return replace(
             self,
             total_steps=int(self.total_steps * self.exploiter_share / self.exploiters),
             seed=self.seed + 1000 * number,
             init=str(learner),
-            self_play_fraction=0.0,
-            scripted_fraction=1.0,
-            opponents=opponents,
-            eval_opponents=opponents,
-            snapshots=1,
             evaluations=1,
-            exploiters=0,
+            **only_against(str(learner / "last.npz")),
         )
 
     @staticmethod
@@ -131,6 +125,22 @@ class PPOConfig(SelfPlayConfig):
     def rollout(self) -> int:
         """Number of steps between two updates. Training ends with a whole rollout."""
         return self.n_steps * self.slots
+
+
+def only_against(player: str) -> dict[str, Any]:
+    """Return the settings of a training against one player only.
+
+    Args:
+        player: Name of a driver or path of a policy.
+    """
+    return {
+        "opponents": [player],
+        "eval_opponents": [player],
+        "self_play_fraction": 0.0,
+        "scripted_fraction": 1.0,
+        "snapshots": 1,
+        "exploiters": 0,
+    }
 
 
 def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> PPOConfig:

@@ -11,14 +11,13 @@ and others, 2020).
 
 from __future__ import annotations
 
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
-from games import cpu_minutes, folder_of, train
+from games import cpu_minutes, folder_of, train_all
 from rich.console import Console
 from rich.table import Table
 from rows import DATA, Again, Book, Cell, Row, RowsFile, read
@@ -116,25 +115,18 @@ def main(
         for seed in range(seeds)
         for partner in partners
     ]
-    wanted = book.missing(cells, again)
-    if not wanted:
+    missing = book.missing(cells, again)
+    if not missing:
         return
-    groups = dict.fromkeys(cell[:2] for cell in wanted)
-    with ProcessPoolExecutor(jobs) as pool:
-        waiting = [
-            pool.submit(
-                train,
-                folder_for(out, game, method, seed),
-                game,
-                {"seed": seed, **METHODS[method]},
-            )
-            for game, method in groups
-            for seed in range(seeds)
-        ]
-        for k, done in enumerate(waiting, 1):
-            done.result()
-            print(f"{k} of {len(waiting)} runs are finished, in {out}", flush=True)
-    book.fill(wanted, partial(measure, out), jobs)
+    groups = dict.fromkeys(cell[:2] for cell in missing)
+    runs = [
+        (folder_for(out, game, method, seed), game, {"seed": seed, **METHODS[method]})
+        for game, method in groups
+        for seed in range(seeds)
+    ]
+    for _ in train_all(runs, jobs):
+        pass
+    book.fill(missing, partial(measure, out), jobs)
     Console(width=110).print(summary(read(book.path)))
 
 

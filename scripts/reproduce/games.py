@@ -11,7 +11,7 @@ the return and the success of an episode.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -53,6 +53,18 @@ def train(folder: Path, game: str, changes: dict[str, Any]) -> None:
     """Train a run, or resume its training."""
     begun = (folder / "config.toml").exists()
     run_training(None if begun else preset(game, changes), folder)
+
+
+def train_all(
+    runs: Sequence[tuple[Path, str, dict[str, Any]]], jobs: int
+) -> Iterator[int]:
+    """Train runs, each with a folder, a game and changes; yield the finished ones."""
+    with ProcessPoolExecutor(jobs, max_tasks_per_child=1) as pool:
+        waiting = [pool.submit(train, *run) for run in runs]
+        for k, done in enumerate(waiting):
+            done.result()
+            yield k
+            print(f"{k + 1} of {len(runs)} runs are finished: {runs[k][0]}", flush=True)
 
 
 def cpu_minutes(folder: Path) -> float:
@@ -109,21 +121,15 @@ def curve_of(out: Path, game: str, seed: int) -> list[Row]:
     return points
 
 
-def train_all(
+def add_curves(
     out: Path, runs: Iterable[tuple[str, int]], points: Path, jobs: int
 ) -> None:
     """Train the runs of games and seeds that have no curve yet; add their curves."""
     known = {(row["game"], row["seed"]) for row in read(points)}
-    wanted = [(g, s) for g, s in runs if (g, str(s)) not in known]
-    with ProcessPoolExecutor(jobs, max_tasks_per_child=1) as pool:
-        waiting = [
-            pool.submit(train, folder_of(out, game, seed), game, {"seed": seed})
-            for game, seed in wanted
-        ]
-        for k, done in enumerate(waiting):
-            done.result()
-            write(points, read(points) + curve_of(out, *wanted[k]))
-            print(f"{k + 1} of {len(wanted)} runs are finished, in {out}", flush=True)
+    missing = [(g, s) for g, s in runs if (g, str(s)) not in known]
+    tasks = [(folder_of(out, g, s), g, {"seed": s}) for g, s in missing]
+    for k in train_all(tasks, jobs):
+        write(points, read(points) + curve_of(out, *missing[k]))
 
 
 def plot_curves(points: Path, path: Path) -> None:
@@ -203,13 +209,13 @@ def main(
 ) -> None:
     """Train the runs, measure the players that have no row, print table and curves."""
     book, names = BOOK.at(rows), games.split(",")
-    wanted = book.missing([c for name in names for c in cells_of(name, seeds)], again)
-    if not wanted:
+    missing = book.missing([c for name in names for c in cells_of(name, seeds)], again)
+    if not missing:
         return
     points = book.path.with_name(f"{book.path.stem}_{POINTS}" if rows else POINTS)
-    runs = dict.fromkeys((c[0], int(c[1])) for c in wanted if c[1].isdigit())
-    train_all(out, runs, points, jobs)
-    book.fill(wanted, partial(measure, out), jobs)
+    runs = dict.fromkeys((c[0], int(c[1])) for c in missing if c[1].isdigit())
+    add_curves(out, runs, points, jobs)
+    book.fill(missing, partial(measure, out), jobs)
     table = Table(*COLUMNS)
     for line in summary(read(book.path)):
         table.add_row(*line)

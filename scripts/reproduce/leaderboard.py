@@ -60,7 +60,12 @@ after a wall bounce.
 
 
 def main() -> None:
-    """Read the cards and write the page."""
+    """Write the page."""
+    (DOCS / "leaderboard.md").write_text(page())
+
+
+def page() -> str:
+    """Return the page, from the cards and the rows of the population."""
     cards = {
         path: ChallengeReport.from_json(path.read_text())
         for path in sorted((DOCS / "leaderboard").glob("*.json"))
@@ -75,7 +80,7 @@ def main() -> None:
         name = f"[{card.name}](leaderboard/{path.name})"
         lines.append(f"| {name} | {' | '.join(shares)} |")
     tail = TAIL.replace("STYLES", "\n".join(styles()))
-    (DOCS / "leaderboard.md").write_text("\n".join([*lines, tail]))
+    return "\n".join([*lines, tail])
 
 
 def styles() -> list[str]:

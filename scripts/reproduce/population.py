@@ -20,12 +20,11 @@ import typer
 from games import train
 from reaction import USUAL
 from reaction import measure as duels
-from rich.console import Console
-from rich.table import Table
-from rows import DATA, Again, Book, Row, RowsFile, read
+from rows import DATA, Again, Book, Row, RowsFile, fill_and_print
 
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.population import FOLDER, STYLES, digest
+from marl_airhockey.learn.ppo_config import only_against
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.registry import find_scenario, make_driver
 
@@ -39,7 +38,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     "hasty": {"gamma": 0.95},
     "early": {"total_steps": 2_000_000},
     "late": {"total_steps": 16_000_000},
-    "exploiter": {"self_play_fraction": 0.0, "scripted_fraction": 1.0},
+    "exploiter": {},
 }
 """Changes of the preset by style. The exploiter trains against the late player only."""
 STEPS, GAMES, SEED = 8_000_000, 400, 8_000_000
@@ -54,7 +53,7 @@ def train_style(out: Path, style: str) -> None:
     """Train a player and save it without its seed."""
     changes = {"total_steps": STEPS, **SIZE, **CHANGES[style]}
     if style == "exploiter":
-        changes["opponents"] = changes["eval_opponents"] = [str(FOLDER / "late.npz")]
+        changes |= only_against(str(FOLDER / "late.npz"))
     train(out / style, "duel", {"seed": secrets.randbelow(2**31), **changes})
     found = NumpyPolicy.load(out / style / "last.npz")
     card = {
@@ -101,12 +100,7 @@ def main(
         train_style(out, STYLES[-1])
         print(f"hash: {digest()}", flush=True)
     book = BOOK.at(rows)
-    if wanted := book.missing([(style,) for style in STYLES], again or new):
-        book.fill(wanted, measure, jobs)
-        table = Table(*FIELDS)
-        for row in read(book.path):
-            table.add_row(*row.values())
-        Console(width=100).print(table)
+    fill_and_print(book, [(style,) for style in STYLES], measure, jobs, again or new)
 
 
 if __name__ == "__main__":

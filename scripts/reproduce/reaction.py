@@ -15,9 +15,7 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
-from rows import DATA, Again, Book, Cell, Row, RowsFile, read
+from rows import DATA, Again, Book, Cell, Row, RowsFile, fill_and_print
 
 import marl_airhockey as ah
 from marl_airhockey.rollouts import play as episodes
@@ -94,12 +92,7 @@ def main(
     book = BOOK.at(rows)
     cells: list[Cell] = [(r, *pair) for r, pair in product(REACTIONS, SCRIPTS)]
     cells += [(USUAL, *pair) for pair in TRAINED]
-    if wanted := book.missing(cells, again):
-        book.fill(wanted, measure, jobs)
-        table = Table(*FIELDS)
-        for row in read(book.path):
-            table.add_row(*row.values())
-        Console(width=120).print(table)
+    fill_and_print(book, cells, measure, jobs, again)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.console import Console
+from rich.table import Table
 
 Row = dict[str, Any]
 Cell = tuple[Any, ...]
@@ -135,6 +137,19 @@ class Book:
                 # Finished rows are saved; do not wait for the others.
                 pool.shutdown(cancel_futures=True)
                 raise
+
+
+def fill_and_print(
+    book: Book, cells: Sequence[Cell], work: Callable[..., Row], jobs: int, again: bool
+) -> None:
+    """Compute the missing cells of a book; if there were any, print all its rows."""
+    if missing := book.missing(cells, again):
+        book.fill(missing, work, jobs)
+        rows = read(book.path)
+        table = Table(*rows[0])
+        for row in rows:
+            table.add_row(*row.values())
+        Console(width=120).print(table)
 
 
 def compute(

@@ -13,9 +13,7 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
-from rows import DATA, Again, Book, Cell, Row, RowsFile, read
+from rows import DATA, Again, Book, Cell, Row, RowsFile, fill_and_print
 
 from marl_airhockey.build import build_world
 from marl_airhockey.registry import make_scenario
@@ -107,12 +105,7 @@ def main(
     """Measure the games that have no row, then print the table."""
     book = BOOK.at(rows)
     cells: list[Cell] = [(game, name) for game in PLAYERS for name in PLAYERS[game]]
-    if wanted := book.missing(cells, again):
-        book.fill(wanted, measure, jobs)
-        table = Table(*FIELDS)
-        for row in read(book.path):
-            table.add_row(*row.values())
-        Console(width=110).print(table)
+    fill_and_print(book, cells, measure, jobs, again)
 
 
 if __name__ == "__main__":

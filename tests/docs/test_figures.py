@@ -270,6 +270,11 @@ def test_scores_of_games_are_those_of_their_rows():
     assert not known
 
 
+def test_the_leaderboard_is_that_of_its_cards():
+    page = script("reproduce/leaderboard.py")["page"]()
+    assert (ROOT / "docs/leaderboard.md").read_text() == page
+
+
 def test_best_responses_are_those_of_their_rows():
     rows = sorted(rows_of("exploitability.csv"), key=lambda row: row["response_seed"])
     scores = [f"{float(row['score']):.2f}" for row in rows]

@@ -112,11 +112,12 @@ def test_self_play_trains_resumes_and_keeps_its_past(tmp_path):
     assert find_policies(tmp_path) == [folder]
 
 
-def test_exploiters_learn_to_beat_the_learner_and_join_its_opponents(tmp_path):
+def test_exploiters_train_against_the_learner_and_join_its_opponents(tmp_path):
     folder = tmp_path / "run"
     config = preset("duel", {**GAME, "exploiters": 2, "pool": 8})
     run_training(config, folder)
     assert len(list(folder.glob("pool/*-exploiter.npz"))) == 2
+    assert len(list(folder.glob("exploiters/*.npz"))) == 2, "counted when resumed"
     for number in (1, 2):
         run = folder / "exploiters" / str(number)
         learner = run / "learner" / "last.npz"
