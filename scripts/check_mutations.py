@@ -197,14 +197,14 @@ FAULTS = [
         "marl_airhockey/hardware/robot/supervisor.py",
         "self._must_let_go |= fault in LATCHED",
         "self._must_let_go |= False",
-        "hardware/lab/test_emulated_robot.py",
+        "hardware/emulated/test_emulated_robot.py",
     ),
     Fault(
         "a driver recovers by an old word",
         "marl_airhockey/hardware/robot/driver.py",
         "if before is not DriverState.FAULT:",
         "if False:",
-        "hardware/lab/test_emulated_robot.py",
+        "hardware/emulated/test_emulated_robot.py",
     ),
     Fault(
         "last step is not recorded",
@@ -225,14 +225,14 @@ FAULTS = [
         "marl_airhockey/hardware/robot/driver.py",
         "self._arm.release(self._motion.pose)",
         "pass",
-        "hardware/lab/test_rest.py",
+        "hardware/emulated/test_rest.py",
     ),
     Fault(
         "speed slider ignored",
         "marl_airhockey/hardware/robot/motion.py",
         "self.shaper.scale_speed(self.scaling)",
         "self.shaper.scale_speed(1.0)",
-        "hardware/lab/test_speed_slider.py",
+        "hardware/emulated/test_speed_slider.py",
     ),
     Fault(
         "target runs ahead of the arm",

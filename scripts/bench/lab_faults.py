@@ -4,7 +4,7 @@
 
 A trained policy juggles through camera and arm. After a second one or two faults are
 switched on. Faults that were reported by others are omitted, see
-`tests/hardware/lab/test_fault_atlas.py`. The script prints
+`tests/hardware/emulated/test_fault_atlas.py`. The script prints
 
 * the reason with which the episode ends, or ``continues`` if no end is observed,
 * the time until then,

@@ -167,9 +167,15 @@ def test_every_name_in_backticks_exists(page):
 
 
 @cache
+def command_line():
+    """Return the command ``airhockey``, which takes long to build."""
+    return typer.main.get_command(app)
+
+
+@cache
 def options_of(words):
     """Return the options of a command of ours, by the words that name it."""
-    found, known = typer.main.get_command(app), set()
+    found, known = command_line(), set()
     for word in words:
         known |= {name for p in found.params for name in (*p.opts, *p.secondary_opts)}
         if not hasattr(found, "commands") or word not in found.commands:
@@ -185,7 +191,7 @@ def test_every_command_and_option_exists(page):
         options = {word.partition("=")[0] for word in given if word.startswith("-")}
         options -= {"-", "--"}
         if given[0] == "airhockey":
-            groups = typer.main.get_command(app).commands
+            groups = command_line().commands
             named = [word for word in given[1:] if not word.startswith("-")]
             if named and not named[0].isupper():
                 assert named[0] in groups, line

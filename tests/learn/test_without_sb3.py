@@ -26,6 +26,7 @@ assert ah.evaluate(result.folder, episodes=2).scenario == "touch"
 """
 
 
+@pytest.mark.slow
 def test_the_engine_torch_trains_without_stable_baselines3(tmp_path):
     command = [sys.executable, "-c", PROGRAM, str(tmp_path / "run")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -312,3 +312,23 @@ def test_the_speed_slider_of_another_client_slows_the_robot(robot):
         speeds.append(abs(robot.get_observation().vy))
     slider.disconnect()
     assert max(speeds) < 1.03 * 0.3
+
+
+@pytest.mark.slow
+def test_a_late_state_delays_the_start_and_moves_nothing():
+    with emulator():
+        before = status()["pose"]
+        switch("late_state", "--address", ADDRESS)
+        with Robot(CONFIG) as robot:
+            assert robot.state is DriverState.READY
+            assert status()["pose"] == before
+
+
+@pytest.mark.slow
+def test_a_client_whose_recipes_are_forgotten_is_refused():
+    with emulator():
+        before = status()["pose"]
+        switch("forgotten_recipes", "--address", ADDRESS)
+        with pytest.raises(RobotError, match="control script did not start"):
+            Robot(CONFIG).connect()
+        assert status()["pose"] == before

@@ -54,7 +54,9 @@ def test_two_processes_on_an_empty_cache_compile_once(tmp_path):
     assert run(LOOP, tmp_path) == ("[1.0, 3.0, 5.0]", "")
 
 
-@pytest.mark.parametrize("damage", [b"", b"not a pickle"])
+@pytest.mark.parametrize(
+    "damage", [b"not a pickle", pytest.param(b"", marks=pytest.mark.slow)]
+)
 def test_a_damaged_file_is_compiled_again_with_one_line(tmp_path, damage):
     run(LOOP, tmp_path)
     (path,) = tmp_path.rglob("loop_*.code")
@@ -118,7 +120,9 @@ def test_code_that_nobody_uses_is_deleted_when_something_is_compiled(tmp_path):
     assert not old.exists()
 
 
-@pytest.mark.parametrize("numba_folder", [False, True])
+@pytest.mark.parametrize(
+    "numba_folder", [False, pytest.param(True, marks=pytest.mark.slow)]
+)
 def test_an_edit_of_another_file_is_never_stale(tmp_path, numba_folder):
     copy = tmp_path / "marl_airhockey"
     skip = shutil.ignore_patterns("zoo", "web", "__pycache__")

@@ -5,24 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from emulators import ADDRESS, emulator, status, switch
 
 from marl_airhockey.hardware.lab.emulated_robot import EmulatedRobot
-from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.robot import (
     DriverState,
     Fault,
-    Robot,
-    RobotConfig,
-    RobotError,
 )
 from marl_airhockey.hardware.robot.supervisor import OFF_TABLE
 from marl_airhockey.hardware.ur_emulator.faults import FAULTS
 from marl_airhockey.hardware.ur_emulator.safety import Safety
 
 STEP = 0.05
-SETUP = LabSetup()
-CONFIG = RobotConfig(ADDRESS, SETUP.mounting, SETUP.seat.reach)
 REPORTED = [name for name, fault in FAULTS.items() if fault.source]
 OF_CONNECTIONS = ("forgotten_recipes", "late_state")
 """Faults that only a client over the network meets"""
@@ -121,28 +114,6 @@ def test_a_robot_that_is_ready_keeps_its_program_alive():
     robot.advance(10.0)
     assert robot.state is DriverState.READY
     assert robot.controller.script.running
-
-
-@pytest.mark.slow
-def test_a_late_state_delays_the_start_and_moves_nothing():
-    pytest.importorskip("rtde_control")
-    with emulator():
-        before = status()["pose"]
-        switch("late_state", "--address", ADDRESS)
-        with Robot(CONFIG) as robot:
-            assert robot.state is DriverState.READY
-            assert status()["pose"] == before
-
-
-@pytest.mark.slow
-def test_a_client_whose_recipes_are_forgotten_is_refused():
-    pytest.importorskip("rtde_control")
-    with emulator():
-        before = status()["pose"]
-        switch("forgotten_recipes", "--address", ADDRESS)
-        with pytest.raises(RobotError, match="control script did not start"):
-            Robot(CONFIG).connect()
-        assert status()["pose"] == before
 
 
 def test_every_reported_fault_is_in_the_docs():
