@@ -5,6 +5,7 @@ import types
 from .evaluation.crossplay import crossplay as crossplay
 from .evaluation.evaluate import evaluate as evaluate
 from .evaluation.league import league as league
+from .evaluation.suites.suite import load_suite as load_suite
 from .learn.train import train as train
 from .make import env as env
 from .make import gym_env as gym_env

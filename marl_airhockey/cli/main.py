@@ -26,6 +26,7 @@ from marl_airhockey.cli import (
     play,
     precompile,
     study,
+    suite,
     teleop,
     train,
     transfer,
@@ -76,6 +77,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
 GROUPS = {
     "data": recordings.data,
     "study": study.study,
+    "suite": suite.suite,
     "calibrate": camera.calibrate,
     "lab": lab.lab,
     "ur-emulator": ur_emulator.ur_emulator,

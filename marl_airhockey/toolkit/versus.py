@@ -175,7 +175,7 @@ class Versus(ServingScenario):
         won = (goals >= self.goals_to_win) & (goals > goals[..., ::-1])
         return np.asarray(won.any(-1))
 
-    def needs_serve(self, t: Transition) -> Array:
+    def needs_serve(self, t: Transition) -> Array | None:
         return np.asarray((t.new_memory["serve"] != 0.0).any(-1))
 
     def headings(self, memory: Memory) -> Array:

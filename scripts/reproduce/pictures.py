@@ -3,8 +3,8 @@
     python scripts/reproduce/pictures.py --out docs/images
     python scripts/reproduce/pictures.py --out docs/images --arm
 
-The first command writes ``tasks.png`` and ``games.png``, and the second ``arm.png``, a
-duel of two arms, which requires robosuite.
+The first command writes ``tasks.png``, ``games.png`` and ``set_pieces.png``, and the
+second ``arm.png``, a duel of two arms, which requires robosuite.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ import typer
 from PIL import Image
 
 import marl_airhockey as ah
+from marl_airhockey.evaluation.suites.pieces import suite_names
+from marl_airhockey.evaluation.suites.suite import Solution
 from marl_airhockey.rollouts.play import play
 from marl_airhockey.sim.contracts.palette import LIGHT, rgb
 from marl_airhockey.sim.render.picture import draw
@@ -27,6 +29,8 @@ COLUMNS, GAP = 2, 12
 """Number of images in a row, and pixels between them."""
 MOMENT = 1.9
 """Time of the image of a game, s."""
+MEDIUM = 3
+"""Class of difficulty of the piece of a suite."""
 VIEWS = "frontview", "agentview", "birdview"
 SEEDS = range(2, 22)
 """Seeds that are played until an episode succeeds."""
@@ -54,6 +58,22 @@ def moment(name: str, width: int) -> Array:
             break
     x, y = world.scene.table.size
     return draw(renderer.frame(), width if x > WIDE * y else round(0.75 * width))
+
+
+def solved_piece(name: str, width: int) -> Array:
+    """Return an image of the end of a piece of a suite, played by its solution."""
+    suite = ah.load_suite(name)
+    drivers = {"paddle_0": Solution(name), **suite.drivers}
+    world = ah.make_world(suite.scenario, drivers=drivers)
+    world.autoreset = False
+    renderer = Renderer(world, "rgb_array", name)
+    world.reset(int((suite.pieces.difficulty == MEDIUM).argmax()))
+    renderer.begin()
+    for step in play(world):
+        renderer.follow()
+        if world.state.time[0] >= MOMENT / 2 or step.ended.any():
+            break
+    return draw(renderer.frame(), width)
 
 
 def arms(width: int, seconds: float = 1.5) -> Array:
@@ -106,7 +126,7 @@ def main(
     width: Annotated[int, typer.Option(help="Width of one image, px.")] = 560,
     arm: Annotated[bool, typer.Option("--arm", help="Only the image of arms.")] = False,
 ) -> None:
-    """Play all scenarios, and write one image of the tasks and one of the games."""
+    """Play all scenarios and suites, and write one image of each kind."""
     out.mkdir(parents=True, exist_ok=True)
     if arm:
         save(out / "arm.png", arms(320))
@@ -115,6 +135,7 @@ def main(
     for name in ah.scenario_names():
         alone = len(ah.make_scenario(name).scene.seats) == 1
         kinds["tasks" if alone else "games"].append(moment(name, width))
+    kinds["set_pieces"] = [solved_piece(name, width) for name in suite_names()]
     for kind, pictures in kinds.items():
         save(out / f"{kind}.png", sheet(pictures, width))
 

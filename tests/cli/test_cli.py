@@ -286,6 +286,24 @@ def test_several_runs_are_summed_up(touch_run):
     assert data["over_runs"]["runs"] == 2
 
 
+def test_suites_are_listed_and_two_drivers_compared():
+    assert "defence-v1" in airhockey("suite", "list").stdout
+    tasks = json.loads(airhockey("suite", "list", "--json").stdout)
+    assert {task["rule"] for task in tasks} == {"keep", "score"}
+    words = ("suite", "run", "still", "defence-v1", "--against", "goalkeeper")
+    shown = " ".join(airhockey(*words).stdout.split())
+    assert "only still solves 0 pieces, only goalkeeper" in shown
+    found = json.loads(airhockey(*words, "--json").stdout)
+    still, keeper = found["results"]
+    assert still["success"] == 0.0
+    (pair,) = found["differences"].values()
+    assert pair["only_second"] == keeper["success"] * 1000
+    assert pair["p_value"] < 1e-6
+    slow = (*words[:2], "goalkeeper", "defence-v1", "--option", "reaction=0.4")
+    (late,) = json.loads(airhockey(*slow, "--json").stdout)["results"]
+    assert late["success"] < keeper["success"]
+
+
 def test_a_league_with_another_seed_plays_other_games(tmp_path):
     words = ("league", "duel", "striker", "random", "--games", "2", "--json")
     tables = [

@@ -9,6 +9,7 @@ from statistics import mean
 
 import pytest
 
+import marl_airhockey as ah
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.hardware.rig import LATEST
 from marl_airhockey.hardware.robot import MotionLimits
@@ -226,6 +227,32 @@ def test_ladders_have_the_ratings_of_their_files(game):
     assert len(ladder) == len(rows)
     for cells, known in zip(rows, ladder, strict=True):
         assert float(cells[column]) == pytest.approx(float(known["elo"]), abs=0.6)
+
+
+def test_set_pieces_have_the_shares_of_their_rows():
+    rows = {(row["suite"], row["driver"]): row for row in rows_of("suites.csv")}
+    shown = table("docs/set_pieces.md", "driver", "attack-v1")
+    for line in shown:
+        driver, *_ = line.values()
+        for suite in list(line)[1:]:
+            known = rows[suite, driver]
+            assert line[suite] == f"{float(known['success']):.3f}"
+            low, high = interval(float(known["success"]), 1000)
+            assert high - low < 0.065
+    assert len(shown) * (len(line) - 1) == len(rows)
+    for line in table("docs/set_pieces.md", "driver in defence-v1"):
+        driver, *shares = line.values()
+        known = rows["defence-v1", driver]
+        for k, share in enumerate(shares):
+            assert float(share) == pytest.approx(
+                float(known[f"class_{k + 1}"]), abs=0.0051
+            )
+    for line in table("docs/set_pieces.md", "suite", "solvable"):
+        task = ah.load_suite(line["suite"].strip("`")).pieces.task
+        assert line["task of `paddle_0`"] == task.title
+        assert line["`paddle_1`"] == f"`{task.drivers['paddle_1']}`"
+        assert float(line["seconds"]) == task.seconds
+        assert line["solvable"] == f"{task.solvable:.2f}"
 
 
 def test_gaps_of_coordination_are_those_of_their_rows():

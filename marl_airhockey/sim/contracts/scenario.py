@@ -185,6 +185,18 @@ class Scenario(Display, ABC):
         """Return points (W, n, 2), m, that obstacles must leave free; None for none."""
         return None
 
+    @property
+    def hides(self) -> bool:
+        """True if `hidden` hides pucks at some time."""
+        return False
+
+    def hidden(self, state: State, memory: Memory) -> Array:
+        """(..., pucks) bool: no seat sees the puck now, by the rules of the scenario.
+
+        Its last seen position and velocity are observed instead.
+        """
+        return np.zeros(state.visible.shape, np.bool_)
+
     @final
     @property
     def name(self) -> str:

@@ -104,8 +104,11 @@ class RandomStreams:
     spread: float = 1.0
     """Share of every range, around its middle, from which `uniform` samples."""
 
-    def __init__(self, keys: Array, counts: Array, rows: Array) -> None:
+    def __init__(
+        self, keys: Array, counts: Array, rows: Array, ordinals: Array
+    ) -> None:
         self._keys, self._counts, self._rows = keys, counts, rows
+        self._ordinals = ordinals
 
     @classmethod
     def keyed(cls, seeds: Array, episodes: Array, purpose: str) -> RandomStreams:
@@ -125,9 +128,17 @@ class RandomStreams:
 
     def select(self, rows: Array | slice) -> RandomStreams:
         """Return the streams of ``rows`` (a mask or indices into these rows)."""
-        some = RandomStreams(self._keys, self._counts, self._rows[rows])
+        some = RandomStreams(self._keys, self._counts, self._rows[rows], self._ordinals)
         some.spread = self.spread
         return some
+
+    @property
+    def ordinals(self) -> Array:
+        """Seed of the world plus number of the episode, from 0, modulo 2^64 (W,).
+
+        Scenarios that begin with listed situations in turn use it as the index.
+        """
+        return self._ordinals[self._rows]
 
     def units(self, *shape: int) -> Array:
         """Sample (W, *shape) numbers uniform in [0, 1)."""
@@ -171,6 +182,7 @@ class StreamSet:
         salts = [zlib.crc32(purpose.encode()) for purpose in purposes]
         self._salts = np.array(salts, np.uint64)
         self._keys, self._counts = np.zeros((2, len(salts), worlds), np.uint64)
+        self._ordinals = np.zeros(worlds, np.uint64)
         self._all = np.arange(worlds)
 
     def renew(self, rows: Array, seeds: Array, episodes: Array) -> None:
@@ -183,6 +195,7 @@ class StreamSet:
         """
         # One type, so that one compiled function serves all callers.
         seeds = seeds.astype(np.uint64, copy=False)
+        self._ordinals[rows] = seeds[rows] + episodes[rows].astype(np.uint64) - 1
         _begin(self._keys, self._counts, rows, seeds, episodes, self._salts)
 
     def keys(self, purpose: str) -> Array:
@@ -198,4 +211,4 @@ class StreamSet:
         """
         k = self._place[purpose]
         rows = self._all if rows is None else rows
-        return RandomStreams(self._keys[k], self._counts[k], rows)
+        return RandomStreams(self._keys[k], self._counts[k], rows, self._ordinals)

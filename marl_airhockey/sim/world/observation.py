@@ -10,6 +10,8 @@ import numpy as np
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array, Rows
 
+NOWHERE = np.zeros(0, np.int64)
+"""Indices of no worlds."""
 Observation = Array | Mapping[str, Array]
 """Array (B, seats, D) float32 or (B, seats, 84, 84, 3) uint8, or dict with goals."""
 

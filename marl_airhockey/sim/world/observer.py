@@ -24,7 +24,8 @@ from marl_airhockey.sim.jit.fused import Fused, Sink, Source
 from marl_airhockey.sim.jit.pipeline import Stage
 from marl_airhockey.sim.sensing.reaction import Parts, ReactionDelay, whole_steps
 from marl_airhockey.sim.sensing.sensor import Sensor
-from marl_airhockey.sim.world.observation import Observation, replaced
+from marl_airhockey.sim.world.hidden_pucks import HiddenPucks
+from marl_airhockey.sim.world.observation import NOWHERE, Observation, replaced
 from marl_airhockey.types import ALL, Array, Memory, Rows
 
 PIXELS = 84
@@ -67,10 +68,11 @@ class Observer:
         """Observation type of the open seats."""
         self._top_speed = physics.highest("paddle_speed")
         steps = whole_steps(scenario.reaction, sensor.control_dt)
-        self._delay = ReactionDelay(steps) if steps else None
+        self._delay = ReactionDelay(steps) if steps or scenario.hides else None
+        self._hidden = HiddenPucks.of(scenario, forms)
         self.reaction = steps * sensor.control_dt
         """Latency of observations by the rules of the game, s."""
-        self.direct = self.observe == "velocity" and sensor.ideal and not steps
+        self.direct = self.observe == "velocity" and sensor.ideal and not self._delay
         """True if open seats observe the true state, so that `stage` fills it in."""
         self._layouts: dict[str, ObservationLayout] = {}
         self._fused: dict[str, Fused] = {}
@@ -122,7 +124,7 @@ class Observer:
             memory: Memory of the scenario in all worlds.
         """
         if self._delay is not None:
-            self._delay.begin(worlds, self._parts(sensed, memory))
+            self._delay.begin(worlds, self._parts(sensed, memory, worlds))
         for form, fused in self._fused.items():
             if not fused.prepared:
                 fused.prepare(*self._sources(sensed, memory, form))
@@ -130,7 +132,7 @@ class Observer:
     def note(self, sensed: State, memory: Memory) -> None:
         """Store the sensed state after a step, for later observations."""
         if self._delay is not None:
-            self._delay.push(self._parts(sensed, memory))
+            self._delay.push(self._parts(sensed, memory, NOWHERE))
 
     def known(
         self, sensed: State, memory: Memory, form: str = "velocity"
@@ -247,8 +249,10 @@ class Observer:
         shape = (rows, len(game.goal_bounds))
         return {"observation": flat} | {n: np.zeros(shape, np.float32) for n in GOALS}
 
-    def _parts(self, sensed: State, memory: Memory) -> Parts:
+    def _parts(self, sensed: State, memory: Memory, begun: Array) -> Parts:
         """Return the parts that are observed with the reaction time."""
+        if self._hidden is not None:
+            sensed = self._hidden.seen(sensed, memory, begun)
         past = self.sensor.past() | {"frames": self.sensor.frames}
         parts = {"state": vars(sensed), "memory": memory, "sensor": past}
         if "estimate" in self.forms:

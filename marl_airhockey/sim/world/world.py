@@ -38,7 +38,12 @@ from marl_airhockey.sim.world.driven_seat import DrivenSeat
 from marl_airhockey.sim.world.elements import DragRegions, check_elements, clear_start
 from marl_airhockey.sim.world.episode import EpisodeCounters, PhysicsRows
 from marl_airhockey.sim.world.known import Known
-from marl_airhockey.sim.world.observation import Observation, duplicate, put
+from marl_airhockey.sim.world.observation import (
+    NOWHERE,
+    Observation,
+    duplicate,
+    put,
+)
 from marl_airhockey.sim.world.observer import Observer
 from marl_airhockey.sim.world.placement import check_placement
 from marl_airhockey.sim.world.referee import Referee
@@ -47,9 +52,6 @@ from marl_airhockey.sim.world.set_state import checked_memory, checked_worlds, s
 from marl_airhockey.sim.world.spaces import WorldSpaces
 from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.types import Array, Memory
-
-NOWHERE = np.zeros(0, np.int64)
-"""Indices of no worlds."""
 
 
 class World(WorldSpaces):

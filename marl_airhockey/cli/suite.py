@@ -1,0 +1,104 @@
+"""Commands ``airhockey suite list | run``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+from rich.box import SIMPLE
+from rich.table import Table
+
+from marl_airhockey.cli.environment import SimulationOptions, in_environment
+from marl_airhockey.cli.options import AsJson, console
+from marl_airhockey.evaluation.suites.pieces import suite_names
+from marl_airhockey.evaluation.suites.suite import (
+    PairedDifference,
+    SuiteResult,
+    load_suite,
+)
+from marl_airhockey.registry import make_driver
+
+suite = typer.Typer(
+    help="Measure drivers on set pieces: fixed situations of a game with a task.",
+    no_args_is_help=True,
+)
+
+
+@suite.command("list")
+def list_suites(as_json: AsJson = False) -> None:
+    """List the suites with their tasks."""
+    found = [load_suite(name) for name in suite_names()]
+    if as_json:
+        tasks = [{"name": s.name, **asdict(s.pieces.task)} for s in found]
+        console.print_json(json.dumps(tasks))
+        return
+    table = Table("suite", "task", "pieces", "seconds", "paddle_1", box=SIMPLE)
+    for s in found:
+        shown = f"{s.scenario.seconds:g}", s.drivers["paddle_1"]
+        table.add_row(s.name, s.title, str(len(s)), *shown)
+    console.print(table)
+
+
+@suite.command()
+@in_environment
+def run(
+    player: Annotated[
+        str, typer.Argument(help="Name of a driver, or path of a policy.")
+    ],
+    environment: SimulationOptions,
+    suites: Annotated[
+        list[str] | None,
+        typer.Argument(help="Names or files of suites; by default all suites."),
+    ] = None,
+    against: Annotated[
+        str, typer.Option(help="Other driver, compared on the same pieces.")
+    ] = "",
+    as_json: AsJson = False,
+) -> None:
+    """Let a driver play all pieces of suites, and print its success.
+
+    The columns 1 to 5 have the success in the classes of difficulty, the easiest first.
+    """
+    keywords = environment.keywords
+    options = keywords.pop("options", {})
+    results, pairs = [], {}
+    for name in suites or suite_names():
+        chosen = load_suite(name, **options)
+        players = [player, against] if against else [player]
+        played = [chosen.play(make_driver(p), **keywords) for p in players]
+        results += [
+            chosen.summarize(*pair) for pair in zip(players, played, strict=True)
+        ]
+        if against:
+            pairs[name] = PairedDifference.of(*(each.solved for each in played))
+    if as_json:
+        data = {
+            "results": [result.to_json() for result in results],
+            "differences": {name: asdict(pair) for name, pair in pairs.items()},
+        }
+        console.print_json(json.dumps(data))
+        return
+    console.print(table_of(results))
+    for name, pair in pairs.items():
+        console.print(
+            f"{name}: only {player} solves {pair.only_first} pieces, only {against} "
+            f"{pair.only_second} (McNemar, p = {pair.p_value:.3g})",
+            soft_wrap=True,
+            highlight=False,
+        )
+
+
+def table_of(results: list[SuiteResult]) -> Table:
+    """Return the table of results."""
+    columns = "suite", "driver", "success", *"12345"
+    table = Table(*columns, box=SIMPLE)
+    for found in results:
+        low, high = found.success_interval
+        table.add_row(
+            *(found.suite, found.driver),
+            f"{found.success:.3f} ({low:.3f}..{high:.3f})",
+            *(f"{share:.2f}" for share in found.by_class),
+        )
+    return table
