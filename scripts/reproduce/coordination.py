@@ -98,7 +98,7 @@ def summary(rows: list[Row]) -> Table:
 def main(
     games: Annotated[
         str, typer.Option(help="Names of games, separated by commas.")
-    ] = "rally",
+    ] = "rally,team_juggle",
     seeds: Annotated[int, typer.Option(help="Number of seeds, from 0.")] = 3,
     jobs: Annotated[int, typer.Option(help="Number of processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs/games"),

@@ -37,7 +37,6 @@ def test_all_that_keep_rows_are_known():
 def test_committed_rows_are_named_and_not_computed(name, tmp_path):
     few = {"tasks.py": ["--tasks", "reach", "--seeds", "3"]}
     few["hindsight.py"] = ["--tasks", "reach"]
-    few["games.py"] = ["--games", "duel,doubles,rally"]
     few["table.py"] = ["--tasks", "touch,reach,strike", "--algos", "bc", "--seeds", "1"]
     shown = run(name, *few.get(name, []), cwd=tmp_path)
     head, *rest = shown.splitlines()
