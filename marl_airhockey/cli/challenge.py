@@ -17,6 +17,8 @@ from marl_airhockey.evaluation.challenge import (
     play_challenge,
 )
 from marl_airhockey.evaluation.challenge_report import ChallengeResult
+from marl_airhockey.evaluation.population import STYLES
+from marl_airhockey.evaluation.suites.pieces import suite_names
 from marl_airhockey.sim.core.errors import require
 
 
@@ -37,18 +39,19 @@ def challenge(
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
-    """Play the ten tasks in three profiles, and duels, and write a result card.
+    """Play tasks in three profiles, duels and set pieces, and write a result card.
 
     The protocol is fixed, so that the cards of different policies can be compared.
     """
     require("matplotlib", "train")
     with bar() as progress:
         total = len(TASKS) * len(PROFILES) + len(FIELD)
+        total += len(STYLES) + len(suite_names())
         task = progress.add_task("challenge", total=total, note="")
 
         def report(result: ChallengeResult) -> None:
             """Update the progress bar."""
-            what = f"{result.scenario} {result.opponent or result.profile}"
+            what = f"{result.name}, {result.part} in {result.profile}"
             progress.update(task, advance=1, note=f"{what} {result.score:.2f}")
 
         card = play_challenge(policy, name or policy, __version__, report=report)

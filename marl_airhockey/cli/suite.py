@@ -34,10 +34,10 @@ def list_suites(as_json: AsJson = False) -> None:
         tasks = [{"name": s.name, **asdict(s.pieces.task)} for s in found]
         console.print_json(json.dumps(tasks))
         return
-    table = Table("suite", "task", "pieces", "seconds", "paddle_1", box=SIMPLE)
+    table = Table("suite", "game", "task", "pieces", "seconds", box=SIMPLE)
     for s in found:
-        shown = f"{s.scenario.seconds:g}", s.drivers["paddle_1"]
-        table.add_row(s.name, s.title, str(len(s)), *shown)
+        shown = str(len(s)), f"{s.scenario.seconds:g}"
+        table.add_row(s.name, s.pieces.task.game, s.title, *shown)
     console.print(table)
 
 
@@ -92,13 +92,15 @@ def run(
 
 def table_of(results: list[SuiteResult]) -> Table:
     """Return the table of results."""
-    columns = "suite", "driver", "success", *"12345"
-    table = Table(*columns, box=SIMPLE)
+    table = Table("suite", box=SIMPLE, pad_edge=False)
+    table.add_column("driver", overflow="fold")
+    for title in ("success", "95 %", *"12345"):
+        table.add_column(title, no_wrap=True)
     for found in results:
         low, high = found.success_interval
         table.add_row(
-            *(found.suite, found.driver),
-            f"{found.success:.3f} ({low:.3f}..{high:.3f})",
-            *(f"{share:.2f}" for share in found.by_class),
+            *(found.suite, found.driver, f"{found.success:.3f}"),
+            f"{low:.2f}..{high:.2f}",
+            *("-" if share is None else f"{share:.2f}" for share in found.by_class),
         )
     return table

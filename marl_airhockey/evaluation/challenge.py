@@ -1,23 +1,29 @@
 """Challenge: a fixed protocol that makes results of different authors comparable.
 
-It has the ten tasks in three profiles, duels against known opponents, and duels against
-a population of players of different styles. The physics parameters of the tasks are
-sampled for each episode. A part of the protocol that was not played has the score 0.
+It has the ten tasks in three profiles, duels against known opponents, duels against a
+population of players of different styles, and suites of set pieces. The physics
+parameters of the tasks are sampled for each episode. What was not played has the score
+0.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from marl_airhockey.evaluation.challenge_report import ChallengeReport, ChallengeResult
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.population import opponents
 from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.evaluation.suites.pieces import suite_names
+from marl_airhockey.evaluation.suites.suite import load_suite
 from marl_airhockey.policies.load import ZOO
 from marl_airhockey.registry import make_driver
+from marl_airhockey.sim.contracts.driver import Driver
 
 TASKS = (
     "reach",
@@ -90,13 +96,14 @@ def play_challenge(
             population is not the published one.
     """
     results, files = [], {}
-    others = {name: name for name in FIELD} | opponents()
-    cells = [(t, p, "") for p in PROFILES for t in TASKS]
-    cells += [("duel", "ideal", opponent) for opponent in others]
-    for scenario, profile, opponent in cells:
-        player = find_player(given, scenario, profile)
-        other = others.get(opponent, "")
-        result = _play(scenario, profile, opponent, other, player, episodes, games)
+    cells = [("tasks", task, profile) for profile in PROFILES for task in TASKS]
+    cells += [("duel", opponent, "ideal") for opponent in FIELD]
+    cells += [("population", opponent, "ideal") for opponent in opponents()]
+    cells += [("set pieces", suite, "ideal") for suite in suite_names()]
+    for part, played, profile in cells:
+        player = find_player(given, _scenario_of(part, played), profile)
+        count = episodes if part == "tasks" else games
+        result = _play(part, played, profile, player, count)
         if result.player and Path(player).is_file():
             digest = hashlib.sha256(Path(player).read_bytes()).hexdigest()
             files[Path(player).name] = digest
@@ -109,47 +116,60 @@ def play_challenge(
     return ChallengeReport(name, version, episodes, games, files, tuple(results))
 
 
+def _scenario_of(part: str, name: str) -> str:
+    """Return the scenario of a task, a duel or a suite."""
+    if part == "set pieces":
+        return load_suite(name).pieces.task.game
+    return name if part == "tasks" else "duel"
+
+
 def _play(
-    scenario: str,
-    profile: str,
-    opponent: str,
-    other: str,
-    player: str,
-    episodes: int,
-    games: int,
+    part: str, name: str, profile: str, player: str, count: int
 ) -> ChallengeResult:
-    """Play one task in one profile, or the duel against one opponent, ``other``."""
-
-    def missing(note: str) -> ChallengeResult:
-        return ChallengeResult(
-            scenario, profile, opponent, "", 0.0, 0.0, 0.0, 0.0, "", note
-        )
-
+    """Play a task in one profile, a duel against one opponent, or a suite."""
+    missing = ChallengeResult(part, name, profile, "", 0.0, 0.0, 0.0)
     if not player:
-        return missing("no policy of this name")
-    shown = Path(player).name
+        return replace(missing, note="no policy of this name")
     try:
-        driver = make_driver(player)
-        if opponent:
-            found, _ = play_against(scenario, driver, [make_driver(other)], games, SEED)
-            score = float(found[0])
-            ends = interval(score, games)
-            return ChallengeResult(
-                scenario, profile, opponent, shown, score, *ends, 0.0, "", ""
-            )
-        task = evaluate(
-            driver,
-            scenario,
-            episodes=episodes,
-            seed=SEED,
-            name=shown,
-            exact=True,
-            profile=profile,
-        )
+        found = PLAY[part](make_driver(player), name, profile, count)
     except ValueError as error:
-        return missing(str(error))
-    success, ends = task.success, task.success_interval
-    first, grade = task.first_shot, task.deployability.grade
-    return ChallengeResult(
-        scenario, profile, "", shown, success, *ends, first, grade, ""
+        return replace(missing, note=str(error))
+    return replace(missing, player=Path(player).name, **found)
+
+
+def _play_task(
+    driver: Driver, name: str, profile: str, episodes: int
+) -> dict[str, Any]:
+    found = evaluate(
+        driver, name, episodes=episodes, seed=SEED, exact=True, profile=profile
     )
+    low, high = found.success_interval
+    return {
+        **{"score": found.success, "low": low, "high": high},
+        "first_shot": found.first_shot,
+        "deployability": found.deployability.grade,
+    }
+
+
+def _play_duel(driver: Driver, name: str, profile: str, games: int) -> dict[str, Any]:
+    opponent = make_driver(opponents().get(name, name))
+    score, _ = play_against("duel", driver, [opponent], games, SEED)
+    low, high = interval(float(score[0]), games)
+    return {"score": float(score[0]), "low": low, "high": high}
+
+
+def _play_suite(driver: Driver, name: str, profile: str, games: int) -> dict[str, Any]:
+    suite = load_suite(name)
+    found = suite.summarize("", suite.play(driver))
+    low, high = found.success_interval
+    return {"score": found.success, "low": low, "high": high}
+
+
+PLAY: Mapping[str, Callable[[Driver, str, str, int], dict[str, Any]]] = {
+    "tasks": _play_task,
+    "duel": _play_duel,
+    "population": _play_duel,
+    "set pieces": _play_suite,
+}
+"""Functions that play a part, with driver, name, profile and number of episodes or
+games. They return fields of the result."""

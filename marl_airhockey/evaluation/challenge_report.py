@@ -3,39 +3,42 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-PROTOCOL = 3
+PROTOCOL = 4
 """Number of the protocol. It is increased whenever the challenge changes, because cards
 of different protocols are not comparable."""
+
+PARTS = ("tasks", "duel", "population", "set pieces")
+"""Parts of the protocol."""
 
 
 @dataclass(frozen=True)
 class ChallengeResult:
-    """Result of one task in one profile, or of the duel against one opponent."""
+    """Result of a task in one profile, a duel against one opponent, or a suite."""
 
-    scenario: str
+    part: str
+    """Part of the protocol, one of `PARTS`."""
+    name: str
+    """Name of the task, of the opponent, or of the suite."""
     profile: str
-    opponent: str
-    """Opponent; "" in a task."""
     player: str
-    """File or name of the driver that played; "" if this part was not played."""
+    """File or name of the driver that played; "" if it was not played."""
     score: float
-    """Success of a task, or share of won games of a duel, where a draw counts half."""
+    """Success, or share of won games of a duel, where a draw counts half."""
     low: float
     high: float
     """Ends of the 95 % interval of the score."""
-    first_shot: float
-    """Share of episodes that succeeded before a second distinct touch; 0 in duels."""
-    deployability: str
-    """Class A to D of a task, see `Deployability`; "" in duels."""
-    note: str
-    """Reason why this part was not played; "" if it was played."""
+    first_shot: float = 0.0
+    """Share of episodes of a task that succeeded before a second distinct touch."""
+    deployability: str = ""
+    """Class A to D of a task, see `Deployability`."""
+    note: str = ""
+    """Reason why it was not played; "" if it was played."""
 
 
 @dataclass(frozen=True)
@@ -57,37 +60,33 @@ class ChallengeReport:
     @property
     def profiles(self) -> list[str]:
         """Profiles in which tasks were played."""
-        return list(dict.fromkeys(r.profile for r in self.results if not r.opponent))
+        return list(dict.fromkeys(r.profile for r in self._of("tasks")))
 
-    def total(
-        self, keep: Callable[[ChallengeResult], bool]
-    ) -> tuple[float, float, float]:
+    def _of(self, part: str) -> list[ChallengeResult]:
+        """Return the results of a part."""
+        return [result for result in self.results if result.part == part]
+
+    @staticmethod
+    def total(results: Sequence[ChallengeResult]) -> tuple[float, float, float]:
         """Return the mean score of some results, and its 95 % interval.
 
         The interval combines those of the results as independent errors. Parts that
         were not played count as exactly 0.
         """
-        kept = [result for result in self.results if keep(result)]
-        mean = float(np.mean([result.score for result in kept]))
-        errors = [(r.score - r.low, r.high - r.score) for r in kept if r.player]
-        down, up = np.sqrt(np.square([(0.0, 0.0), *errors]).sum(0)) / len(kept)
+        mean = float(np.mean([result.score for result in results]))
+        errors = [(r.score - r.low, r.high - r.score) for r in results if r.player]
+        down, up = np.sqrt(np.square([(0.0, 0.0), *errors]).sum(0)) / len(results)
         return mean, mean - float(down), mean + float(up)
 
     @property
     def totals(self) -> dict[str, tuple[float, float, float]]:
-        """Mean scores with intervals: each profile, all tasks, and the duels.
-
-        Duels against the population are apart from those against known opponents.
-        """
-        found = {}
-        for profile in self.profiles:
-            in_it = partial(_is_task, profile=profile)
-            found[profile] = self.total(in_it)
-        found["tasks"] = self.total(lambda r: not r.opponent)
-        for part, inside in (("duel", False), ("population", True)):
-            those = partial(_is_duel, population=inside)
-            found[part] = self.total(those)
-        return found
+        """Mean scores with intervals: the tasks in each profile, and each part."""
+        tasks = self._of("tasks")
+        found = {
+            profile: self.total([r for r in tasks if r.profile == profile])
+            for profile in self.profiles
+        }
+        return found | {part: self.total(self._of(part)) for part in PARTS}
 
     def to_json(self) -> str:
         """Return the card as JSON."""
@@ -134,16 +133,16 @@ class ChallengeReport:
         head = "| task | profile | player | success (95 %) | first shot | deployable |"
         lines += ["", head, "| --- " * 6 + "|"]
         lines += [
-            f"| {r.scenario} | {r.profile} | {r.player or r.note} | {_share(r)} | "
+            f"| {r.name} | {r.profile} | {r.player or r.note} | {_share(r)} | "
             f"{r.first_shot:.3f} | {r.deployability} |"
-            for r in self.results
-            if not r.opponent
+            for r in self._of("tasks")
         ]
-        lines += ["", "| duel against | player | score (95 %) |", "| --- " * 3 + "|"]
+        lines += ["", "| opponent or suite | player | score (95 %) |"]
+        lines += ["| --- " * 3 + "|"]
         lines += [
-            f"| {r.opponent} | {r.player or r.note} | {_share(r)} |"
-            for r in self.results
-            if r.opponent
+            f"| {r.name} | {r.player or r.note} | {_share(r)} |"
+            for part in PARTS[1:]
+            for r in self._of(part)
         ]
         return "\n".join(lines) + "\n"
 
@@ -157,15 +156,6 @@ class ChallengeReport:
         return files
 
 
-def _is_task(result: ChallengeResult, profile: str) -> bool:
-    return not result.opponent and result.profile == profile
-
-
-def _is_duel(result: ChallengeResult, population: bool) -> bool:
-    member = result.opponent.startswith("population/")
-    return bool(result.opponent) and member == population
-
-
 def _share(result: ChallengeResult) -> str:
     return f"{result.score:.3f} ({result.low:.2f}..{result.high:.2f})"
 
@@ -176,31 +166,32 @@ def plot_card(card: ChallengeReport, path: Path) -> None:
 
     played = [result for result in card.results if result.player]
     parts = {
-        "success": [result for result in played if not result.opponent],
-        "score: win + draw / 2": [result for result in played if result.opponent],
+        "success": [r for r in played if r.part == "tasks"],
+        "score or success": [r for r in played if r.part != "tasks"],
     }
     size = 8.4, 0.36 * max(map(len, _names_of(parts).values())) + 1.6
     figure, (grid,) = panels(1, 2, size)
     for axes, (label, results) in zip(grid, parts.items(), strict=True):
         names = _names_of(parts)[label]
         for result in results:
-            k = 0 if result.opponent else card.profiles.index(result.profile)
-            shift = 0 if result.opponent else 0.2 * (k - (len(card.profiles) - 1) / 2)
-            height = names.index(result.opponent or result.scenario) + shift
+            task = result.part == "tasks"
+            k = card.profiles.index(result.profile) if task else 0
+            shift = 0.2 * (k - (len(card.profiles) - 1) / 2) if task else 0.0
+            height = names.index(result.name) + shift
             ends = result.low, result.high
-            where = "" if result.opponent else f"profile {result.profile}"
+            where = f"profile {result.profile}" if task else ""
             point(axes, height, result.score, ends, series(k), where)
         axes.set_yticks(range(len(names)), [name.replace("_", " ") for name in names])
         axes.set(xlim=(-0.03, 1.03), ylim=(max(len(names), 1) - 0.4, -0.6))
         axes.set_xlabel(f"{label} (95 % interval)")
     grid[0].set_title(f"tasks, n = {card.episodes} episodes")
-    grid[1].set_title(f"duels, n = {card.games} games")
+    grid[1].set_title(f"duels, n = {card.games}, and suites")
     save(figure, path, card.name)
 
 
 def _names_of(parts: dict[str, list[ChallengeResult]]) -> dict[str, list[str]]:
-    """Return the names of the tasks and of the opponents."""
+    """Return the names of the tasks, and of the opponents and suites."""
     return {
-        label: list(dict.fromkeys(r.opponent or r.scenario for r in results))
+        label: list(dict.fromkeys(r.name for r in results))
         for label, results in parts.items()
     }

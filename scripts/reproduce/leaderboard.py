@@ -11,11 +11,15 @@ import typer
 from rows import DATA, read
 
 from marl_airhockey.evaluation.challenge import FIELD, PROFILES
-from marl_airhockey.evaluation.challenge_report import PROTOCOL, ChallengeReport
+from marl_airhockey.evaluation.challenge_report import (
+    PARTS,
+    PROTOCOL,
+    ChallengeReport,
+)
 from marl_airhockey.evaluation.population import SHA256
 
 DOCS = Path(__file__).parents[2] / "docs"
-PARTS = (*PROFILES, "tasks", "duel", "population")
+COLUMNS = (*PROFILES, *PARTS)
 HEAD = f"""# Leaderboard
 
 This page compares policies by a fixed protocol, number {PROTOCOL}.
@@ -25,13 +29,15 @@ This page compares policies by a fixed protocol, number {PROTOCOL}.
   In ur5e and gantry, physics and sensing are sampled for each episode.
 - Duels: games against {", ".join(FIELD)}.
 - Population: games against eight players of different styles, see below.
-- A task or game without a policy counts as 0.
+- Set pieces: the suites of [set pieces](set_pieces.md).
+- What has no policy counts as 0.
 - A card contains the version of the library and the SHA-256 of each policy file, so
   that anyone can measure the policies again. It is not signed.
 
 All values are means with 95 % intervals. The columns with the name of a profile show
 the success in the ten tasks in that profile, and "tasks" the success in all profiles.
-"duel" and "population" are shares of won games, in which a draw counts half.
+"duel" and "population" are shares of won games, in which a draw counts half. "set
+pieces" is the mean success in the suites.
 """
 TAIL = f"""
 ## The population
@@ -70,12 +76,12 @@ def page() -> str:
         path: ChallengeReport.from_json(path.read_text())
         for path in sorted((DOCS / "leaderboard").glob("*.json"))
     }
-    lines = [HEAD, f"| player | {' | '.join(PARTS)} |", "| --- " * 7 + "|"]
+    lines = [HEAD, f"| player | {' | '.join(COLUMNS)} |", "| --- " * 8 + "|"]
     best_first = sorted(cards.items(), key=lambda item: -item[1].totals["tasks"][0])
     for path, card in best_first:
         shares = [
             f"{mean:.3f} ({low:.3f}..{high:.3f})"
-            for mean, low, high in (card.totals[part] for part in PARTS)
+            for mean, low, high in (card.totals[column] for column in COLUMNS)
         ]
         name = f"[{card.name}](leaderboard/{path.name})"
         lines.append(f"| {name} | {' | '.join(shares)} |")

@@ -18,7 +18,7 @@ from PIL import Image
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.suites.pieces import suite_names
-from marl_airhockey.evaluation.suites.suite import Solution
+from marl_airhockey.evaluation.suites.solution import Solution
 from marl_airhockey.rollouts.play import play
 from marl_airhockey.sim.contracts.palette import LIGHT, rgb
 from marl_airhockey.sim.render.picture import draw

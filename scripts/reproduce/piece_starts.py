@@ -13,6 +13,8 @@ Starts = tuple[Array, Array]
 Range = tuple[float, float]
 FREE = 0.09
 """Smallest distance between the centres of two bodies, m."""
+REACTION, ROOM = 0.15, np.array([0.80, 0.27])
+"""Reaction time of the games, s, and largest distances of a puck from the centre, m."""
 ASIDE = (-0.25, 0.25)
 """Range of the positions across the table, m."""
 
@@ -32,7 +34,10 @@ def moving(
 
 
 def placed(paddles: list[Array], puck: Array, velocity: Array) -> Starts:
-    """Return the candidates whose bodies are apart and on their sides."""
+    """Return the candidates whose bodies are apart, on their sides and in flight.
+
+    The puck has moved at its velocity for the reaction time, without a bounce.
+    """
     position = np.stack([*paddles, puck], 1)
     bodies, own = position.shape[1], len(paddles) // 2
     moves = np.zeros_like(position)
@@ -43,15 +48,15 @@ def placed(paddles: list[Array], puck: Array, velocity: Array) -> Starts:
     fits = (apart >= FREE - 1e-9).all((1, 2)) & (np.abs(x) < 0.78).all(1)
     fits &= (np.abs(y) <= ASIDE[1]).all(1) & (x[:, :own] < -0.06).all(1)
     fits &= (x[:, own:-1] > 0.06).all(1)
+    fits &= (np.abs(puck - REACTION * velocity) < ROOM).all(1)
     return position[fits], moves[fits]
 
 
 def shots(rng: np.random.Generator, n: int) -> Starts:
-    """Shots that leave the paddle of the opponent."""
-    puck, own = within(rng, n, (0.0, 0.7)), within(rng, n, (-0.75, -0.15))
-    velocity = moving(rng, n, np.pi, 1.3, (1.5, 7.0))
-    behind = velocity / np.hypot(*velocity.T)[:, None]
-    return placed([own, puck - FREE * behind], puck, velocity)
+    """Shots in flight."""
+    puck, own = within(rng, n, (-0.3, 0.7)), within(rng, n, (-0.75, -0.15))
+    other = within(rng, n, (0.3, 0.75))
+    return placed([own, other], puck, moving(rng, n, np.pi, 1.3, (1.0, 7.0)))
 
 
 def slow_pucks(rng: np.random.Generator, n: int) -> Starts:
@@ -66,6 +71,15 @@ def counters(rng: np.random.Generator, n: int) -> Starts:
     puck, own = within(rng, n, (-0.1, 0.3)), within(rng, n, (-0.75, -0.3))
     keeper = within(rng, n, (0.06, 0.35))
     return placed([own, keeper], puck, moving(rng, n, np.pi, 0.8, (1.0, 4.0)))
+
+
+def passes(rng: np.random.Generator, n: int) -> Starts:
+    """Slow pucks near the first of two teammates, in doubles."""
+    puck = within(rng, n, (-0.6, -0.15))
+    own = puck + moving(rng, n, np.pi, 1.5, (FREE, 0.2))
+    paddles = [own, within(rng, n, (-0.7, -0.1))]
+    paddles += [within(rng, n, (0.3, 0.7)) for _ in range(2)]
+    return placed(paddles, puck, moving(rng, n, 0.0, np.pi, (0.0, 0.4)))
 
 
 def played(rng: np.random.Generator, n: int) -> Starts:
@@ -86,5 +100,7 @@ def played(rng: np.random.Generator, n: int) -> Starts:
         np.concatenate([getattr(s, name)[:, :bodies] for s in found]) for name in parts
     )
     gap = np.linalg.norm(position[:, :2] - position[:, 2:], axis=-1).min(1)
-    chosen = rng.permutation(np.flatnonzero(gap > FREE))[:n]
+    past = position[:, 2] - REACTION * velocity[:, 2]
+    fits = (gap > FREE) & (np.abs(past) < ROOM).all(1)
+    chosen = rng.permutation(np.flatnonzero(fits))[:n]
     return position[chosen], velocity[chosen]

@@ -4,13 +4,13 @@
     python scripts/reproduce/suites.py --make defence-v1 --out pieces
 
 A suite is made from random candidates. A piece is selected if a paddle at rest fails, a
-random paddle fails in at least 4 of 5 rounds, and a search finds actions that solve it.
+random paddle fails in at least 4 of 5 plays, and a search finds actions that solve it.
 The search plays scripts, and policies with sampled actions, and stores the first
 actions that succeed. It knows the puck when it is hidden. The class of a piece is given
 by the share of plays of the population of the challenge that solve it, whose players no
 table shows: the classes are equal ranges of this share, up to that of the easiest
-pieces. A changed suite needs a new name, and its hash belongs in
-`evaluation/suites/pieces.py`.
+pieces. In doubles, there is no population, and the levels of the zoo take its place. A
+changed suite needs a new name, and its hash belongs in `evaluation/suites/pieces.py`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,15 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from piece_starts import Starts, counters, played, shots, slow_pucks
+from piece_search import play_actions
+from piece_starts import (
+    Starts,
+    counters,
+    passes,
+    played,
+    shots,
+    slow_pucks,
+)
 from rows import DATA, Again, Book, Cell, Row, RowsFile, fill_and_print
 
 from marl_airhockey.build import build_driven_world
@@ -34,19 +42,15 @@ from marl_airhockey.evaluation.population import opponents
 from marl_airhockey.evaluation.suites.pieces import (
     ARRAYS,
     CLASSES,
-    STEPS_OF_ACTIONS,
     Pieces,
     Task,
-    load_pieces,
     suite_names,
 )
-from marl_airhockey.evaluation.suites.suite import Solution, Suite
-from marl_airhockey.policies.load import load_policy
+from marl_airhockey.evaluation.suites.solution import Solution
+from marl_airhockey.evaluation.suites.suite import Suite, load_suite
 from marl_airhockey.registry import make_driver
 from marl_airhockey.rollouts.rollout import play_episodes
-from marl_airhockey.sim.contracts.driver import Driver, View
-from marl_airhockey.sim.core.rng import RandomStreams
-from marl_airhockey.sim.core.seat import Seat
+from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
 
@@ -55,29 +59,13 @@ CANDIDATES, EACH = 8000, 200
 EASIEST = 0.98
 """Quantile of the share of plays that counts as that of the easiest pieces."""
 TRIES = 4
-"""Number of sampled plays of each player of the population."""
+"""Number of sampled plays of each player that gives the classes."""
 SCRIPTS = ("goalkeeper", "striker", "allround")
-LEVELS = (*(f"zoo/duel_{k}" for k in range(1, 5)), "zoo/duel")
-
-
-class Rounded(Driver):
-    """Driver whose actions have the precision of stored ones."""
-
-    def __init__(self, inner: Driver) -> None:
-        self._inner, self.observe = inner, inner.observe
-        self.trained_in = inner.trained_in
-
-    def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
-        """Return the memory of the inner driver."""
-        return self._inner.reset(seat, rng, worlds)
-
-    def act(
-        self, view: View, memory: dict[str, Array]
-    ) -> tuple[Array, dict[str, Array]]:
-        """Return the rounded actions of the inner driver."""
-        actions, memory = self._inner.act(view, memory)
-        steps = np.rint(np.clip(actions, -1.0, 1.0) * STEPS_OF_ACTIONS)
-        return steps / STEPS_OF_ACTIONS, memory
+LEVELS = {
+    game: (*(f"zoo/{game}_{k}" for k in range(1, 5)), f"zoo/{game}")
+    for game in ("duel", "doubles")
+}
+"""Levels of the zoo by game."""
 
 
 @dataclass(frozen=True)
@@ -90,39 +78,36 @@ class Recipe:
     """True to hide the puck for 0.1 to 0.3 s of its flight."""
 
 
-RULES = version_of("duel")
 # Opponents are scripts: the last bits of a network's actions depend on the processor
 # and on the number of worlds, and a solution must be the same everywhere.
-RESTS, AGAINST_KEEPER = {"paddle_1": "still"}, {"paddle_1": "goalkeeper"}
+RESTS, KEEPER = {"paddle_1": "still"}, {"paddle_1": "goalkeeper"}
+TEAMS = {"paddle_1": "allround", "paddle_2": "goalkeeper", "paddle_3": "goalkeeper"}
+
+
+def task(
+    title: str, rule: str, seconds: float, drivers: dict[str, str], game: str = "duel"
+) -> Task:
+    """Return a task by the present rules of a game."""
+    return Task(title, rule, seconds, drivers, game, version_of(game))
+
+
+SHOT = "Stop a shot that would score."
+HIDDEN = "Stop a shot although the puck is hidden for a time."
 RECIPES = {
-    "defence-v1": Recipe(
-        Task("Stop a shot that would score.", "keep", 2.0, RESTS, RULES),
-        shots,
-    ),
-    "blackout-v1": Recipe(
-        Task(
-            "Stop a shot although the puck is hidden for a time.",
-            "keep",
-            2.0,
-            RESTS,
-            RULES,
-        ),
-        shots,
-        hides=True,
-    ),
+    "defence-v1": Recipe(task(SHOT, "keep", 2.0, RESTS), shots),
+    "blackout-v1": Recipe(task(HIDDEN, "keep", 2.0, RESTS), shots, True),
     "attack-v1": Recipe(
-        Task("Score with a slow puck in reach.", "score", 4.0, AGAINST_KEEPER, RULES),
-        slow_pucks,
+        task("Score with a slow puck in reach.", "score", 4.0, KEEPER), slow_pucks
     ),
     "counter-v1": Recipe(
-        Task("Stop a puck and score.", "score", 4.0, AGAINST_KEEPER, RULES),
-        counters,
+        task("Stop a puck and score.", "score", 4.0, KEEPER), counters
     ),
     "played-v1": Recipe(
-        Task(
-            "Concede no goal in a game.", "keep", 4.0, {"paddle_1": "allround"}, RULES
-        ),
+        task("Concede no goal in a game.", "keep", 4.0, {"paddle_1": "allround"}),
         played,
+    ),
+    "pass-v1": Recipe(
+        task("Pass the puck to the teammate.", "pass", 4.0, TEAMS, "doubles"), passes
     ),
 }
 """Recipes by name of the suite."""
@@ -131,41 +116,41 @@ RECIPES = {
 # Selection of pieces
 
 
-def play_actions(suite: Suite, player: Driver, round_: int) -> tuple[Array, Array]:
-    """Return the solved pieces (N,) and the actions (N, T, 2) of a play, rounded."""
-    n, longest = len(suite), suite.pieces.solution.shape[1]
-    keywords = Keywords(drivers=suite.drivers)
-    world = build_driven_world(Rounded(player), suite.scenario, n, keywords)
-    solved, actions = np.zeros(n, np.bool_), np.zeros((n, longest, 2))
-    for k, each in enumerate(
-        play_episodes(world, n, round_ * n, ("success", "action"))
-    ):
-        solved[k] = each.columns["success"][-1, 0] > 0
-        actions[k, : len(each)] = each.columns["action"][:, 0]
-    world.close()
-    return solved, np.rint(actions * STEPS_OF_ACTIONS)
-
-
 def candidates(recipe: Recipe, rng: np.random.Generator, path: Path) -> Suite:
     """Return a suite of candidates in which a paddle at rest fails."""
     position, velocity = recipe.starts(rng, CANDIDATES)
     n, longest = len(position), round(recipe.task.seconds / 0.05)
     hidden = np.zeros((n, 2))
-    if recipe.hides:
-        hidden[:, 0] = rng.uniform(0.05, 0.3, n)
-        hidden[:, 1] = hidden[:, 0] + rng.uniform(0.1, 0.3, n)
     unknown = np.ones(n), np.zeros((n, longest, 2))
     found = Pieces(recipe.task, position, velocity, hidden, *unknown)
     suite = saved(found, path)
     suite = saved(suite.pieces.select(~suite.play("still").solved), path)
-    by_chance = np.mean([suite.play("random", k).solved for k in range(5)], axis=0)
-    return saved(suite.pieces.select(by_chance < 0.3), path)
+    if recipe.hides:
+        suite = saved(with_hidden_pucks(suite, rng), path)
+    solved = np.sum([suite.play("random", k).solved for k in range(5)], axis=0)
+    return saved(suite.pieces.select(solved <= 1), path)
+
+
+def with_hidden_pucks(suite: Suite, rng: np.random.Generator) -> Pieces:
+    """Return the pieces that last long enough, with times to hide the puck.
+
+    It is hidden for 0.1 to 0.3 s before the goal that a paddle at rest concedes.
+    """
+    n, keywords = len(suite), Keywords(drivers=suite.drivers)
+    world = build_driven_world(make_driver("still"), suite.scenario, n, keywords)
+    played = play_episodes(world, n, 0, ("success",))
+    goal = np.array([len(episode) * world.control_dt for episode in played])
+    world.close()
+    long = goal >= 0.3
+    goal, shown = goal[long], suite.pieces.select(long)
+    hidden = rng.uniform(0.1, 0.3, len(goal))
+    begin = rng.uniform(0.0, goal - hidden)
+    return replace(shown, hidden=np.stack([begin, begin + hidden], -1))
 
 
 def saved(pieces: Pieces, path: Path) -> Suite:
     """Save pieces and return their suite."""
     pieces.save(path)
-    load_pieces.cache_clear()
     return Suite(str(path))
 
 
@@ -188,11 +173,13 @@ def solved_pieces(
         solution[new], found[new] = actions[new], True
         return solved
 
-    for name in (*SCRIPTS, "zoo/duel"):
+    game = recipe.task.game
+    for name in (*SCRIPTS, f"zoo/{game}"):
         search(make_driver(name), 0)
     shares = []
-    for player in opponents().values():
-        policy = load_policy(Path(player), deterministic=False)
+    ladder = opponents().values() if game == "duel" else LEVELS[game]
+    for player in ladder:
+        policy = make_driver(player, deterministic=False)
         for k in range(TRIES):
             solved = search(policy, k)
             shares.append(suite.play(policy, k).solved if recipe.hides else solved)
@@ -228,7 +215,22 @@ def make_suite(name: str, out: Path, seed: int) -> None:
 
 # The table
 
-PLAYERS = ("still", "random", *SCRIPTS, *LEVELS, "solution")
+
+VISIBLE = "blackout-v1, visible"
+"""Name of a suite whose pucks are not hidden."""
+
+
+def suite_of(name: str) -> Suite:
+    """Return the suite of a row."""
+    return load_suite(name.split(",")[0], hide=name != VISIBLE)
+
+
+def players(suite: str) -> tuple[str, ...]:
+    """Return the drivers that are measured in a suite."""
+    levels = LEVELS[suite_of(suite).pieces.task.game]
+    return ("still", "random", *SCRIPTS, *levels, "solution")
+
+
 FIELDS = (
     *("suite", "driver", "pieces", "success"),
     *(f"class_{k + 1}" for k in range(CLASSES)),
@@ -237,16 +239,16 @@ FIELDS = (
 BOOK = Book(
     DATA / "suites.csv",
     FIELDS[:2],
-    lambda row: (row["suite"], PLAYERS.index(row["driver"])),
+    lambda row: (row["suite"], players(row["suite"]).index(row["driver"])),
 )
 
 
 def measure(name: str, player: str) -> Row:
     """Return the row of a driver, or of the stored solutions, in a suite."""
-    suite = Suite(name)
-    driver = Solution(name) if player == "solution" else make_driver(player)
+    suite = suite_of(name)
+    driver = Solution(suite.name) if player == "solution" else make_driver(player)
     found = suite.summarize(player, suite.play(driver))
-    shares = found.success, *found.by_class
+    shares = found.success, *(share or 0.0 for share in found.by_class)
     more = found.touched, found.first_touch, found.violations
     numbers = (round(x, 4) for x in (*shares, *more))
     values = name, player, len(suite), *numbers
@@ -269,7 +271,9 @@ def main(
             names = make.split(",")
             list(pool.map(partial(make_suite, out=out, seed=seed), names))
         return
-    cells: list[Cell] = [(s, player) for s in suite_names() for player in PLAYERS]
+    cells: list[Cell] = [
+        (s, player) for s in (*suite_names(), VISIBLE) for player in players(s)
+    ]
     fill_and_print(BOOK.at(rows), cells, measure, jobs, again)
 
 

@@ -289,7 +289,7 @@ def test_several_runs_are_summed_up(touch_run):
 def test_suites_are_listed_and_two_drivers_compared():
     assert "defence-v1" in airhockey("suite", "list").stdout
     tasks = json.loads(airhockey("suite", "list", "--json").stdout)
-    assert {task["rule"] for task in tasks} == {"keep", "score"}
+    assert {task["rule"] for task in tasks} == {"keep", "score", "pass"}
     words = ("suite", "run", "still", "defence-v1", "--against", "goalkeeper")
     shown = " ".join(airhockey(*words).stdout.split())
     assert "only still solves 0 pieces, only goalkeeper" in shown

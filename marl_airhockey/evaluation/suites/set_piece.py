@@ -10,7 +10,6 @@ import numpy as np
 
 from marl_airhockey.evaluation.suites.pieces import Pieces, load_pieces
 from marl_airhockey.sim.contracts.scenario import Transition
-from marl_airhockey.sim.contracts.units import Seconds
 from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.state import State
@@ -18,12 +17,19 @@ from marl_airhockey.sim.world.placement import check_placement
 from marl_airhockey.toolkit.versus import Versus
 from marl_airhockey.types import Array, Memory
 
+LINEUPS = {
+    "duel": ((0, 0.0), (2, 0.0)),
+    "doubles": ((0, 0.12), (0, -0.12), (2, -0.12), (2, 0.12)),
+}
+"""Lineups by game."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SetPiece(Versus):
-    """Piece of a suite: a situation of duel in which ``paddle_0`` has a task.
+    """Piece of a suite: a situation of a game in which ``paddle_0`` has a task.
 
-    Observation, reaction time and rules are those of duel, but no puck is served.
+    Observation, reaction time and rules are those of duel or doubles, but no puck is
+    served.
 
     Start:
         Piece (seed of the world + number of the episode, from 0) modulo the number of
@@ -36,10 +42,17 @@ class SetPiece(Versus):
 
     suite: str
     """Name of a suite, or path of its file."""
-    seconds: Seconds = 4.0
+    hide: bool = True
+    """False to show pucks that a piece hides."""
 
     def __post_init__(self) -> None:
-        task = self.pieces.task
+        task, given = self.pieces.task, self.seconds
+        if given not in (Versus.seconds, task.seconds):
+            raise ValueError(
+                f"seconds: {given}; the pieces of {self.suite} last {task.seconds:g} s"
+            )
+        if self.pucks != 1:
+            raise ValueError(f"pucks: {self.pucks}; pieces have 1")
         if task.rule not in RULES:
             raise ValueError(
                 f"{self.suite}: {unknown_name('rule', task.rule, list(RULES))}"
@@ -47,7 +60,7 @@ class SetPiece(Versus):
         object.__setattr__(self, "seconds", task.seconds)
         super().__post_init__()
         n = len(self.pieces)
-        nobody = np.zeros((n, 2), np.bool_)
+        nobody = np.zeros((n, len(self.lineup)), np.bool_)
         check_placement(self._states(np.arange(n)), self.scene, nobody, self.seconds)
 
     @cached_property
@@ -57,7 +70,7 @@ class SetPiece(Versus):
 
     @property
     def lineup(self) -> tuple[tuple[int, float], ...]:
-        return (0, 0.0), (2, 0.0)
+        return LINEUPS[self.pieces.task.game]
 
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = self._states(self._rows(rng))
@@ -78,9 +91,13 @@ class SetPiece(Versus):
         """Return the index of the piece of each world (W,)."""
         return (rng.ordinals % np.uint64(len(self.pieces))).astype(np.int64)
 
+    @property
+    def moving_start(self) -> bool:
+        return True
+
     @cached_property
     def hides(self) -> bool:
-        return bool(np.ptp(self.pieces.hidden, axis=1).any())
+        return self.hide and bool(np.ptp(self.pieces.hidden, axis=1).any())
 
     def hidden(self, state: State, memory: Memory) -> Array:
         begin, end = (memory["unseen"][..., k] for k in (0, 1))
@@ -108,7 +125,7 @@ class SetPiece(Versus):
         return self.terminated(t) | t.time_limit_reached
 
     def success(self, t: Transition) -> Array:
-        """(..., seats) bool: paddle_0 solves the task, or paddle_1 prevents it."""
+        """(..., seats) bool: a team solves the task, or the other one prevents it."""
         solved = self._solved(t)
         prevented = self._over(t) & ~solved
         return np.stack([solved, prevented], -1)[..., self.teams]
@@ -116,7 +133,7 @@ class SetPiece(Versus):
     def reward_terms(self, t: Transition) -> dict[str, Array]:
         """Return the reward terms.
 
-        task: 1 at the end for the seat that succeeds, -1 for the other one.
+        task: 1 at the end for the team that succeeds, -1 for the other team.
         """
         result = np.where(self.success(t), 1.0, -1.0)
         return {"task": np.where(self._over(t)[..., None], result, 0.0)}
@@ -139,5 +156,12 @@ def score(t: Transition, over: Array) -> Array:
     return scored
 
 
-RULES: Mapping[str, Rule] = {"keep": keep, "score": score}
+def hand_over(t: Transition, over: Array) -> Array:
+    """Return True (...) if the teammate touches the puck next after ``paddle_0``."""
+    before, after = t.memory["toucher"], t.new_memory["toucher"]
+    passed: Array = ((before == 1.0) & (after == 2.0)).any(-1)
+    return passed
+
+
+RULES: Mapping[str, Rule] = {"keep": keep, "score": score, "pass": hand_over}
 """Rules of success by name."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple, Unpack
 
 import numpy as np
@@ -15,17 +16,20 @@ from marl_airhockey.evaluation.evaluate import name_of
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.evaluation.suites.pieces import (
     CLASSES,
-    STEPS_OF_ACTIONS,
     Pieces,
     load_pieces,
 )
 from marl_airhockey.evaluation.suites.set_piece import SetPiece
-from marl_airhockey.registry import DEFAULT_BACKEND, is_live, make_driver
+from marl_airhockey.registry import (
+    DEFAULT_BACKEND,
+    find_backend,
+    find_scenario,
+    is_live,
+    make_driver,
+)
 from marl_airhockey.rollouts.as_trained import as_trained, seen_in
 from marl_airhockey.rollouts.rollout import play_episodes
-from marl_airhockey.sim.contracts.driver import Driver, View
-from marl_airhockey.sim.core.rng import RandomStreams
-from marl_airhockey.sim.core.seat import Seat
+from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
 
@@ -40,9 +44,9 @@ class Piece(NamedTuple):
     seed: int
     """Seed with which an environment of the suite begins this piece."""
     position: Array
-    """Positions of paddles and puck (3, 2), table frame, m."""
+    """Positions of paddles and puck (bodies, 2), table frame, m."""
     velocity: Array
-    """Velocities (3, 2), m/s."""
+    """Velocities (bodies, 2), m/s."""
     difficulty: int
     """Class of difficulty, 1 to 5."""
 
@@ -57,6 +61,8 @@ class SuitePlay:
     """Time of the first touch by ``paddle_0`` (N,), s; nan without one."""
     violations: Array
     """Share of the control steps in which the action exceeded a limit (N,)."""
+    settings: dict[str, Any]
+    """Keywords of the environment and options of the scenario that were given."""
 
 
 @dataclass(frozen=True)
@@ -69,15 +75,17 @@ class SuiteResult:
     success: float
     success_interval: tuple[float, float]
     """95 % interval of the success (Wilson)."""
-    by_class: list[float]
-    """Success in each class of difficulty, the easiest first."""
-    by_class_intervals: list[tuple[float, float]]
+    by_class: list[float | None]
+    """Success in each class of difficulty, the easiest first; None without a piece."""
+    by_class_intervals: list[tuple[float, float] | None]
     touched: float
     """Share of the pieces in which the driver touched the puck."""
     first_touch: float
     """Mean time of the first touch, s."""
     violations: float
     """Share of the control steps in which the action exceeded a limit."""
+    settings: dict[str, Any]
+    """Keywords of the environment and options of the scenario that were given."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields as a JSON object."""
@@ -98,7 +106,16 @@ class PairedDifference:
 
     @staticmethod
     def of(first: Array, second: Array) -> PairedDifference:
-        """Compare the solved pieces (N,) of two drivers."""
+        """Compare the solved pieces (N,) of two drivers.
+
+        Raises:
+            ValueError: The drivers played different numbers of pieces.
+        """
+        if first.shape != second.shape:
+            raise ValueError(
+                f"solved: shapes {first.shape} and {second.shape}; expected the same "
+                "pieces"
+            )
         a, b = int((first & ~second).sum()), int((second & ~first).sum())
         tail = sum(math.comb(a + b, k) for k in range(min(a, b) + 1))
         return PairedDifference(a, b, min(2 * tail / 2 ** (a + b), 1.0))
@@ -128,7 +145,9 @@ class Suite:
     @cached_property
     def scenario(self) -> SetPiece:
         """Scenario that begins with the pieces."""
-        return SetPiece(suite=self.name, **self.options)
+        found = find_scenario(SetPiece, suite=self.name, **self.options)
+        assert isinstance(found, SetPiece)
+        return found
 
     @property
     def title(self) -> str:
@@ -162,21 +181,15 @@ class Suite:
         Raises:
             ValueError: The driver cannot play, or needs another observation.
         """
-        driver = make_driver(player)
-        given: Keywords = {**keywords}
-        given["drivers"] = {**self.drivers, **keywords.get("drivers", {})}
-        scenario, given = as_trained(
-            {name_of(player, driver): driver}, self.scenario, given
-        )
-        driver = seen_in(driver, given)
-        n, backend = len(self), given.get("backend", DEFAULT_BACKEND)
-        if is_live(backend):
-            raise ValueError(
-                f"backend {backend!r}: set pieces begin with moving pucks; use a "
-                "simulation"
-            )
+        driver, backend = make_driver(player), keywords.get("backend", DEFAULT_BACKEND)
+        _check(driver, backend, keywords)
+        form = keywords.get("observe") or driver.observe or "velocity"
+        asked: Keywords = {**keywords, "drivers": {**self.drivers}, "observe": form}
+        name = name_of(player, driver)
+        scenario, given = as_trained({name: driver}, self.scenario, asked)
+        n = len(self)
         at_once = n if backend == DEFAULT_BACKEND else min(n, AT_ONCE)
-        world = build_driven_world(driver, scenario, at_once, given)
+        world = build_driven_world(seen_in(driver, given), scenario, at_once, given)
         try:
             episodes = list(play_episodes(world, n, number * n, COLUMNS))
         finally:
@@ -187,14 +200,24 @@ class Suite:
             np.array([e.columns["success"][-1, 0] > 0 for e in episodes]),
             np.array([t.argmax() * dt if t.any() else np.nan for t in touched]),
             np.array([(e.columns["violation"][:, 0, -1] > 0).mean() for e in episodes]),
+            {**keywords, **({"options": self.options} if self.options else {})},
         )
 
     def summarize(self, name: str, played: SuitePlay) -> SuiteResult:
-        """Return the result of a driver with a name."""
+        """Return the result of a driver with a name.
+
+        Raises:
+            ValueError: Another number of pieces was played.
+        """
+        if len(played.solved) != len(self):
+            raise ValueError(
+                f"{self.name}: {len(played.solved)} pieces were played, and it has "
+                f"{len(self)}"
+            )
         classes = [
             played.solved[self.pieces.difficulty == k + 1] for k in range(CLASSES)
         ]
-        shares = [float(c.mean()) if len(c) else 0.0 for c in classes]
+        shares = [float(c.mean()) if len(c) else None for c in classes]
         solved, touched = float(played.solved.mean()), ~np.isnan(played.first_touch)
         return SuiteResult(
             suite=self.name,
@@ -204,7 +227,7 @@ class Suite:
             success_interval=interval(solved, len(self)),
             by_class=shares,
             by_class_intervals=[
-                interval(share, max(len(c), 1))
+                None if share is None else interval(share, len(c))
                 for share, c in zip(shares, classes, strict=True)
             ],
             touched=float(touched.mean()),
@@ -212,44 +235,38 @@ class Suite:
             if touched.any()
             else 0.0,
             violations=float(played.violations.mean()),
+            settings=dict(played.settings),
         )
 
 
-def load_suite(name: str, **options: Any) -> Suite:
+def _check(driver: Driver, backend: str, keywords: Keywords) -> None:
+    """Raise ValueError if pieces cannot be played, or if they would be others."""
+    if driver.needs_person or driver.needs_device:
+        raise ValueError(f"{driver!r}: needs a person or a device; play by a policy")
+    for name in ("drivers", "max_cycles"):
+        if name in keywords:
+            raise ValueError(f"{name}: the suite has its own; leave it out")
+    if is_live(backend) or not find_backend(backend).instant_contacts:
+        raise ValueError(
+            f"backend {backend!r}: set pieces are too fast for an arm; use numba or "
+            "pymunk"
+        )
+
+
+def load_suite(name: str | Path, /, **options: Any) -> Suite:
     """Return a suite of set pieces.
 
     Args:
         name: Name of a suite, such as ``defence-v1``, or path of a file.
-        **options: Options of the scenario, such as ``reaction`` (s).
+        **options: Options of the scenario, such as ``reaction`` (s), or ``hide=False``
+            to show pucks that pieces hide.
 
     Raises:
         ValueError: The name is unknown, the file is not a suite, or its pieces do not
             fit the options or this version of the rules.
     """
-    found = Suite(name, options)
+    if "suite" in options:
+        raise ValueError(f"suite: the first argument is the suite, {str(name)!r}")
+    found = Suite(str(name), options)
     assert len(found.scenario.pieces)
     return found
-
-
-class Solution(Driver):
-    """Driver of ``paddle_0`` that repeats the stored solution of each piece.
-
-    Args:
-        suite: Name of the suite, or path of its file.
-    """
-
-    def __init__(self, suite: str) -> None:
-        self._actions = load_pieces(suite).solution / STEPS_OF_ACTIONS
-
-    def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
-        """Return the piece and the number of the next step of each world."""
-        piece = (rng.ordinals % np.uint64(len(self._actions))).astype(np.int64)
-        return {"piece": piece, "step": np.zeros(worlds, np.int64)}
-
-    def act(
-        self, view: View, memory: dict[str, Array]
-    ) -> tuple[Array, dict[str, Array]]:
-        """Return the next action of each solution."""
-        step = np.minimum(memory["step"], self._actions.shape[1] - 1)
-        actions = self._actions[memory["piece"], step]
-        return actions, {**memory, "step": memory["step"] + 1}

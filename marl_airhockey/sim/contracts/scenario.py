@@ -186,6 +186,15 @@ class Scenario(Display, ABC):
         return None
 
     @property
+    def moving_start(self) -> bool:
+        """True if bodies moved at constant velocity before the start of an episode.
+
+        Observations with a reaction time then show this movement at first. Otherwise
+        they show the start.
+        """
+        return False
+
+    @property
     def hides(self) -> bool:
         """True if `hidden` hides pucks at some time."""
         return False

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.types import Array
 
 Parts = Mapping[str, Mapping[str, Any]]
@@ -17,22 +18,35 @@ arrays are constant and are not delayed."""
 class ReactionDelay:
     """Delay of sensed states in B worlds, by whole control steps.
 
-    The past of a new episode is filled with its first values.
+    The past of a new episode is filled with its first values, or with the movement of
+    bodies before it.
 
     Args:
         steps: Delay in control steps.
+        moving: Length of a control step, s, if bodies moved at constant velocity before
+            an episode; 0 if they were at rest.
     """
 
-    def __init__(self, steps: int) -> None:
-        self.steps = steps
+    def __init__(self, steps: int, moving: float = 0.0) -> None:
+        self.steps, self._moving = steps, moving
         self._newest = 0
         self._past: dict[tuple[str, str], Array] = {}
         """Ring buffers (steps + 1, B, ...) by part and name."""
+
+    @staticmethod
+    def of(scenario: Scenario, steps: int, control_dt: float) -> ReactionDelay | None:
+        """Return the delay of a scenario; None if seats observe the present."""
+        moving = control_dt if scenario.moving_start else 0.0
+        return ReactionDelay(steps, moving) if steps or scenario.hides else None
 
     def begin(self, worlds: Array, parts: Parts) -> None:
         """Begin an episode in some worlds, by index (W,)."""
         for key, now in _arrays(parts):
             self._ring(key, now)[:, worlds] = now[worlds]
+        for back in range(1, self.steps + 1) if self._moving else ():
+            for part in {"state", "estimate"} & parts.keys():
+                moved = back * self._moving * parts[part]["velocity"][worlds]
+                self._past[part, "position"][self._newest - back, worlds] -= moved
 
     def push(self, parts: Parts) -> None:
         """Append the sensed values after a step."""

@@ -68,7 +68,7 @@ class Observer:
         """Observation type of the open seats."""
         self._top_speed = physics.highest("paddle_speed")
         steps = whole_steps(scenario.reaction, sensor.control_dt)
-        self._delay = ReactionDelay(steps) if steps or scenario.hides else None
+        self._delay = ReactionDelay.of(scenario, steps, sensor.control_dt)
         self._hidden = HiddenPucks.of(scenario, forms)
         self.reaction = steps * sensor.control_dt
         """Latency of observations by the rules of the game, s."""

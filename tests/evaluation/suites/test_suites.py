@@ -14,11 +14,8 @@ from marl_airhockey.evaluation.suites.pieces import (
     load_pieces,
     suite_names,
 )
-from marl_airhockey.evaluation.suites.suite import (
-    PairedDifference,
-    Solution,
-    load_suite,
-)
+from marl_airhockey.evaluation.suites.solution import Solution
+from marl_airhockey.evaluation.suites.suite import PairedDifference, load_suite
 
 SUITES = suite_names()
 
@@ -105,12 +102,20 @@ def test_a_hidden_puck_is_observed_where_it_was_seen_last(some, own):
     seen = np.array(seen)[:, :, :, 0]
     puck = [blind.observer.layout.labels.index(f"puck_0.{a}") for a in "xy"]
     at, true = seen[0][..., puck], seen[1][..., puck]
-    # Observations are 3 steps old, and the puck is last seen after 1 step.
+    # Observations are 3 steps old, and the puck is last seen after 1 step. The movement
+    # before the start is observed at first.
     np.testing.assert_array_equal(at[:5], true[:5])
     for step in range(5, 9):
         np.testing.assert_array_equal(at[step], true[4])
     np.testing.assert_array_equal(at[9:], true[9:])
     assert (true[5:9] != true[4]).any()
+    velocity = some.velocity[:, 2]
+    np.testing.assert_allclose(
+        true[0], some.position[:, 2] - 0.15 * velocity, atol=1e-6
+    )
+    np.testing.assert_allclose(true[3], some.position[:, 2], atol=1e-6)
+    shown = load_suite(suites[0].name, hide=False)
+    assert not shown.scenario.hides
 
 
 def test_paired_drivers_are_told_apart_by_the_pieces_that_only_one_solves():
@@ -137,7 +142,60 @@ def test_a_driver_is_summarized_by_class():
 def test_pieces_run_on_pymunk(some, own):
     suite = load_suite(own(some))
     assert not suite.play("still", backend="pymunk").solved.any()
-    assert suite.play("goalkeeper", backend="pymunk").solved.mean() > 0.5
+    keeper = [suite.play("goalkeeper", backend=b) for b in ("numba", "pymunk")]
+    assert (keeper[0].solved == keeper[1].solved).mean() > 0.7
+
+
+def test_a_suite_file_is_read_again(some, tmp_path):
+    path = tmp_path / "mine.npz"
+    some.save(path)
+    assert len(load_suite(path)) == 12
+    few = some.select(some.difficulty == some.difficulty[0])
+    few.save(path)
+    suite = load_suite(path)
+    assert len(suite) == len(few) < 12
+    result = suite.summarize("still", suite.play("still"))
+    assert result.by_class.count(None) == CLASSES - 1
+    with pytest.raises(ValueError, match="pieces were played"):
+        suite.summarize("still", load_suite("defence-v1").play("still"))
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"reacton": 0.3}, "reacton"),
+        ({"suite": "x"}, "the first argument is the suite"),
+        ({"seconds": 1.0}, "the pieces of defence-v1 last 2 s"),
+        ({"pucks": 2}, "pieces have 1"),
+        ({"reaction": 0.07}, "not a multiple of control_dt"),
+        ({"seats": "robot"}, "outside the workspace|off"),
+    ],
+)
+def test_options_that_do_not_fit_are_named(words, message):
+    with pytest.raises(ValueError, match=message):
+        load_suite("defence-v1", **words).play("still")
+
+
+@pytest.mark.parametrize(
+    ("player", "keywords", "message"),
+    [
+        ("mouse", {}, "needs a person or a device"),
+        ("gamepad", {}, "needs a person or a device"),
+        ("reacher", {}, "has no goal"),
+        ("zoo/juggle", {}, "expects observations of shape"),
+        ("still", {"max_cycles": 3}, "max_cycles: the suite has its own"),
+        (
+            "still",
+            {"drivers": {"paddle_1": "striker"}},
+            "drivers: the suite has its own",
+        ),
+        ("still", {"backend": "robosuite"}, "use numba or pymunk"),
+        ("still", {"backend": "real"}, "use numba or pymunk"),
+    ],
+)
+def test_drivers_and_keywords_that_do_not_fit_are_named(player, keywords, message):
+    with pytest.raises(ValueError, match=message):
+        load_suite("defence-v1").play(player, **keywords)
 
 
 def test_what_is_wrong_with_a_suite_is_named(some, own, tmp_path, monkeypatch):
@@ -150,17 +208,24 @@ def test_what_is_wrong_with_a_suite_is_named(some, own, tmp_path, monkeypatch):
     (tmp_path / "text.npz").write_text("text")
     with pytest.raises(ValueError, match="not a suite of set pieces"):
         load_suite(str(tmp_path / "text.npz"))
-    other = replace(some, task=replace(some.task, rules=0))
+    other = replace(some, task=replace(some.task, version=0))
     with pytest.raises(ValueError, match="made for version 0 of duel"):
         load_suite(own(other))
     other = replace(some, task=replace(some.task, rule="wait"))
     with pytest.raises(ValueError, match="rule 'wait'"):
         load_suite(own(other))
+    code = tmp_path / "code.py"
+    code.write_text("raise SystemExit('it ran')")
+    other = replace(some, task=replace(some.task, drivers={"paddle_1": str(code)}))
+    with pytest.raises(ValueError, match="unknown driver"):
+        load_suite(own(other))
     off = some.position.copy()
     off[3, 2] = (0.0, 0.5)
     with pytest.raises(ValueError, match=r"puck_0 is off the table .*world 3"):
         load_suite(own(replace(some, position=off)))
-    with pytest.raises(ValueError, match=r"position has the shape \(12, 2, 2\)"):
+    with pytest.raises(
+        ValueError, match=r"position has the shape \(12, 2, 2\); expected \(12, 3, 2\)"
+    ):
         load_suite(own(replace(some, position=off[:, :2])))
     with pytest.raises(ValueError, match='use observe="velocity", not estimate'):
         ah.gym_env(
@@ -168,12 +233,22 @@ def test_what_is_wrong_with_a_suite_is_named(some, own, tmp_path, monkeypatch):
             observe="estimate",
             drivers={"paddle_1": "still"},
         )
-    with pytest.raises(ValueError, match="set pieces begin with moving pucks"):
-        load_suite("defence-v1").play("still", backend="real")
-    load_pieces.cache_clear()
+    for name, value in (
+        ("hidden", np.nan),
+        ("hidden", -1.0),
+        ("difficulty", 9),
+        ("position", np.inf),
+    ):
+        bad = {name: np.full_like(getattr(some, name), value)}
+        with pytest.raises(ValueError, match=rf"{name}|difficulty"):
+            load_suite(own(replace(some, **bad)))
+    (tmp_path / "empty.npz").touch()
+    with pytest.raises(ValueError, match="not a suite of set pieces"):
+        load_suite(tmp_path / "empty.npz")
+    module._published.cache_clear()
     monkeypatch.setitem(module.SHA256, "defence-v1", "0" * 64)
     with pytest.raises(ValueError, match="not the published ones"):
         load_suite("defence-v1")
     monkeypatch.undo()
-    load_pieces.cache_clear()
+    module._published.cache_clear()
     assert isinstance(load_pieces("defence-v1"), Pieces)
