@@ -1,4 +1,4 @@
-"""Measure what latency costs, and what methods regain; print a table and draw curves.
+"""Measure what latency costs, and what methods regain; print a table and plot curves.
 
     python scripts/reproduce/delay.py --jobs 2
 

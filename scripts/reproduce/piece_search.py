@@ -35,14 +35,14 @@ class Rounded(Driver):
         return steps / STEPS_OF_ACTIONS, memory
 
 
-def play_actions(suite: Suite, player: Driver, round_: int) -> tuple[Array, Array]:
+def play_actions(suite: Suite, player: Driver, number: int) -> tuple[Array, Array]:
     """Return the solved pieces (N,) and the actions (N, T, 2) of a play, rounded."""
     n, longest = len(suite), suite.pieces.solution.shape[1]
     keywords = Keywords(drivers=suite.drivers)
     world = build_driven_world(Rounded(player), suite.scenario, n, keywords)
     solved, actions = np.zeros(n, np.bool_), np.zeros((n, longest, 2))
     for k, each in enumerate(
-        play_episodes(world, n, round_ * n, ("success", "action"))
+        play_episodes(world, n, number * n, ("success", "action"))
     ):
         solved[k] = each.columns["success"][-1, 0] > 0
         actions[k, : len(each)] = each.columns["action"][:, 0]

@@ -9,7 +9,7 @@ The search plays scripts, and policies with sampled actions, and stores the firs
 actions that succeed. It knows the puck when it is hidden. The class of a piece is given
 by the share of plays of the population of the challenge that solve it, whose players no
 table shows: the classes are equal ranges of this share, up to that of the easiest
-pieces. In doubles, there is no population, and the levels of the zoo take its place. A
+pieces. In doubles, there is no population, and the levels of the zoo replace it. A
 changed suite needs a new name, and its hash belongs in `evaluation/suites/pieces.py`.
 """
 
@@ -70,7 +70,7 @@ LEVELS = {
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a suite is made."""
+    """Recipe of a suite: its task and its candidates."""
 
     task: Task
     starts: Callable[[np.random.Generator, int], Starts]
@@ -84,7 +84,7 @@ RESTS, KEEPER = {"paddle_1": "still"}, {"paddle_1": "goalkeeper"}
 TEAMS = {"paddle_1": "allround", "paddle_2": "goalkeeper", "paddle_3": "goalkeeper"}
 
 
-def task(
+def task_of(
     title: str, rule: str, seconds: float, drivers: dict[str, str], game: str = "duel"
 ) -> Task:
     """Return a task by the present rules of a game."""
@@ -94,20 +94,20 @@ def task(
 SHOT = "Stop a shot that would score."
 HIDDEN = "Stop a shot although the puck is hidden for a time."
 RECIPES = {
-    "defence-v1": Recipe(task(SHOT, "keep", 2.0, RESTS), shots),
-    "blackout-v1": Recipe(task(HIDDEN, "keep", 2.0, RESTS), shots, True),
+    "defence-v1": Recipe(task_of(SHOT, "keep", 2.0, RESTS), shots),
+    "blackout-v1": Recipe(task_of(HIDDEN, "keep", 2.0, RESTS), shots, True),
     "attack-v1": Recipe(
-        task("Score with a slow puck in reach.", "score", 4.0, KEEPER), slow_pucks
+        task_of("Score with a slow puck in reach.", "score", 4.0, KEEPER), slow_pucks
     ),
     "counter-v1": Recipe(
-        task("Stop a puck and score.", "score", 4.0, KEEPER), counters
+        task_of("Stop a puck and score.", "score", 4.0, KEEPER), counters
     ),
     "played-v1": Recipe(
-        task("Concede no goal in a game.", "keep", 4.0, {"paddle_1": "allround"}),
+        task_of("Concede no goal in a game.", "keep", 4.0, {"paddle_1": "allround"}),
         played,
     ),
     "pass-v1": Recipe(
-        task("Pass the puck to the teammate.", "pass", 4.0, TEAMS, "doubles"), passes
+        task_of("Pass the puck to the teammate.", "pass", 4.0, TEAMS, "doubles"), passes
     ),
 }
 """Recipes by name of the suite."""
@@ -191,7 +191,7 @@ def solved_pieces(
 
 def make_suite(name: str, out: Path, seed: int) -> None:
     """Select the pieces of a suite and save them."""
-    rng, kept, path = np.random.default_rng(seed), [], out / f"{name}.npz"
+    rng, parts, path = np.random.default_rng(seed), [], out / f"{name}.npz"
     out.mkdir(parents=True, exist_ok=True)
     room, easiest = np.full(CLASSES + 1, EACH), 0.0
     room[0] = 0
@@ -202,19 +202,18 @@ def make_suite(name: str, out: Path, seed: int) -> None:
         steps = np.minimum((easy / easiest * CLASSES).astype(int), CLASSES - 1)
         classes = CLASSES - steps
         rank = np.array([(classes[:k] == c).sum() for k, c in enumerate(classes)])
-        kept.append(replace(new, difficulty=classes).select(rank < room[classes]))
-        room -= np.bincount(kept[-1].difficulty, minlength=CLASSES + 1)
+        parts.append(replace(new, difficulty=classes).select(rank < room[classes]))
+        room -= np.bincount(parts[-1].difficulty, minlength=CLASSES + 1)
         print(f"  {name}: easiest {easiest:.2f}, missing {room[1:]}", flush=True)
-    arrays = [np.concatenate([getattr(part, n) for part in kept]) for n in ARRAYS]
+    arrays = [np.concatenate([getattr(part, n) for part in parts]) for n in ARRAYS]
     order = rng.permutation(len(arrays[0]))
-    solvable = round(float(np.mean([part.task.solvable for part in kept])), 3)
+    solvable = round(float(np.mean([part.task.solvable for part in parts])), 3)
     task = replace(RECIPES[name].task, solvable=solvable)
     Pieces(task, *(x[order] for x in arrays)).save(path)
     print(path, len(order), hashlib.sha256(path.read_bytes()).hexdigest())
 
 
 # The table
-
 
 VISIBLE = "blackout-v1, visible"
 """Name of a suite whose pucks are not hidden."""

@@ -37,7 +37,7 @@ STEPS_OF_ACTIONS = 127
 
 @dataclass(frozen=True)
 class Task:
-    """What all pieces of a suite have in common."""
+    """Task that all pieces of a suite share."""
 
     title: str
     """One sentence for people."""

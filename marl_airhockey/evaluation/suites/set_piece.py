@@ -146,8 +146,8 @@ Rule = Callable[[Transition, Array], Array]
 
 def keep(t: Transition, over: Array) -> Array:
     """Return True (...) at the end if no goal was conceded."""
-    kept: Array = over & (t.new_memory["goals"][..., 1] == 0.0)
-    return kept
+    clean: Array = over & (t.new_memory["goals"][..., 1] == 0.0)
+    return clean
 
 
 def score(t: Transition, over: Array) -> Array:

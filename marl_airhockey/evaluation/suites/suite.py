@@ -184,9 +184,9 @@ class Suite:
         driver, backend = make_driver(player), keywords.get("backend", DEFAULT_BACKEND)
         _check(driver, backend, keywords)
         form = keywords.get("observe") or driver.observe or "velocity"
-        asked: Keywords = {**keywords, "drivers": {**self.drivers}, "observe": form}
+        requested: Keywords = {**keywords, "drivers": {**self.drivers}, "observe": form}
         name = name_of(player, driver)
-        scenario, given = as_trained({name: driver}, self.scenario, asked)
+        scenario, given = as_trained({name: driver}, self.scenario, requested)
         n = len(self)
         at_once = n if backend == DEFAULT_BACKEND else min(n, AT_ONCE)
         world = build_driven_world(seen_in(driver, given), scenario, at_once, given)

@@ -202,7 +202,7 @@ class Scenario(Display, ABC):
     def hidden(self, state: State, memory: Memory) -> Array:
         """(..., pucks) bool: no seat sees the puck now, by the rules of the scenario.
 
-        Its last seen position and velocity are observed instead.
+        Its last visible position and velocity are observed instead.
         """
         return np.zeros(state.visible.shape, np.bool_)
 

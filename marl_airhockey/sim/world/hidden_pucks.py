@@ -13,11 +13,11 @@ from marl_airhockey.types import Array, Memory
 
 
 class HiddenPucks:
-    """Replacement of hidden pucks by what was seen of them last, in B worlds."""
+    """Replacement of hidden pucks by their last visible values, in B worlds."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
-        self._seen: State | None = None
+        self._last: State | None = None
 
     @staticmethod
     def of(scenario: Scenario, forms: Collection[str]) -> HiddenPucks | None:
@@ -34,22 +34,22 @@ class HiddenPucks:
             )
         return HiddenPucks(scenario) if scenario.hides else None
 
-    def seen(self, sensed: State, memory: Memory, begun: Array) -> State:
-        """Return a sensed state with the last seen values of hidden pucks.
+    def replaced(self, sensed: State, memory: Memory, begun: Array) -> State:
+        """Return a sensed state with the last visible values of hidden pucks.
 
         Args:
             sensed: Sensed state of all worlds.
             memory: Memory of the scenario in all worlds.
             begun: Indices of the worlds (W,) in which an episode begins.
         """
-        pucks, last = sensed.bodies.puck, self._seen or sensed
+        pucks, last = sensed.bodies.puck, self._last or sensed
         unseen = self._scenario.hidden(sensed, memory)
         unseen[begun] = False
         position, velocity = sensed.position.copy(), sensed.velocity.copy()
         for new, old in ((position, last.position), (velocity, last.velocity)):
             new[:, pucks] = np.where(unseen[..., None], old[:, pucks], new[:, pucks])
         visible = sensed.visible & ~unseen
-        self._seen = replace(
+        self._last = replace(
             sensed, position=position, velocity=velocity, visible=visible
         )
-        return self._seen
+        return self._last

@@ -252,7 +252,7 @@ class Observer:
     def _parts(self, sensed: State, memory: Memory, begun: Array) -> Parts:
         """Return the parts that are observed with the reaction time."""
         if self._hidden is not None:
-            sensed = self._hidden.seen(sensed, memory, begun)
+            sensed = self._hidden.replaced(sensed, memory, begun)
         past = self.sensor.past() | {"frames": self.sensor.frames}
         parts = {"state": vars(sensed), "memory": memory, "sensor": past}
         if "estimate" in self.forms:

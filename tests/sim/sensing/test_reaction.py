@@ -7,6 +7,7 @@ import pytest
 
 import marl_airhockey as ah
 from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.sensing.reaction import ReactionDelay
 
 STEPS = 3
 """Control steps in a reaction of 0.15 s at 20 Hz"""
@@ -140,3 +141,18 @@ def test_any_scenario_can_be_late(name):
         result = world.step(np.zeros((2, len(world.open), 2)))
     assert result.observation.shape[-1] == len(world.observer.labels)
     assert np.isfinite(result.observation).all()
+
+
+def test_bodies_that_moved_before_are_observed_where_they_were():
+    delay, rows = ReactionDelay(STEPS, 0.05), np.array([1])
+    names = ("state", "estimate")
+    values = {n: np.full((2, 3, 2), k + 1.0) for k, n in enumerate(names)}
+    parts = {n: {"position": 0.0 * v, "velocity": v} for n, v in values.items()}
+    delay.begin(np.arange(2), parts)
+    delay.push(parts)
+    delay.begin(rows, parts)
+    for step in range(STEPS + 1):
+        for name, speed in zip(names, (1.0, 2.0), strict=True):
+            seen = delay.delayed(name)["position"]
+            np.testing.assert_allclose(seen[1], -0.05 * (STEPS - step) * speed)
+        delay.push(parts)
