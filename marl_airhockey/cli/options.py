@@ -30,6 +30,12 @@ Scenario = Annotated[
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Video = Annotated[
+    Path | None,
+    typer.Option(
+        help="Video to write instead of opening a window: .gif, .webp or .mp4."
+    ),
+]
 Backend = Annotated[
     str,
     typer.Option(

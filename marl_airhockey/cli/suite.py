@@ -1,4 +1,4 @@
-"""Commands ``airhockey suite list | run``."""
+"""Commands ``airhockey suite list | run | watch``."""
 
 from __future__ import annotations
 
@@ -11,14 +11,22 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from marl_airhockey.cli.environment import SimulationOptions, in_environment
-from marl_airhockey.cli.options import AsJson, console
+from marl_airhockey.cli.options import AsJson, Video, console
 from marl_airhockey.evaluation.suites.pieces import suite_names
+from marl_airhockey.evaluation.suites.solution import Solution
 from marl_airhockey.evaluation.suites.suite import (
     PairedDifference,
+    SuitePlay,
     SuiteResult,
     load_suite,
 )
 from marl_airhockey.registry import make_driver
+from marl_airhockey.rollouts.watch import show_episodes
+
+Player = Annotated[
+    str,
+    typer.Argument(metavar="DRIVER", help="Name of a driver, or path of a policy."),
+]
 
 suite = typer.Typer(
     help="Measure drivers on set pieces: fixed situations of a game with a task.",
@@ -44,9 +52,7 @@ def list_suites(as_json: AsJson = False) -> None:
 @suite.command()
 @in_environment
 def run(
-    player: Annotated[
-        str, typer.Argument(help="Name of a driver, or path of a policy.")
-    ],
+    player: Player,
     environment: SimulationOptions,
     suites: Annotated[
         list[str] | None,
@@ -60,22 +66,25 @@ def run(
     """Let a driver play all pieces of suites, and print its success.
 
     The columns 1 to 5 have the success in the classes of difficulty, the easiest first.
+    With --json, the result of each piece is printed, too.
     """
     keywords = environment.keywords
     options = keywords.pop("options", {})
-    results, pairs = [], {}
+    results, plays, pairs = list[SuiteResult](), list[SuitePlay](), {}
     for name in suites or suite_names():
         chosen = load_suite(name, **options)
         players = [player, against] if against else [player]
         played = [chosen.play(make_driver(p), **keywords) for p in players]
-        results += [
-            chosen.summarize(*pair) for pair in zip(players, played, strict=True)
-        ]
+        results += map(chosen.summarize, players, played)
+        plays += played
         if against:
             pairs[name] = PairedDifference.of(*(each.solved for each in played))
     if as_json:
         data = {
-            "results": [result.to_json() for result in results],
+            "results": [
+                {**result.to_json(), "solved": play.solved.tolist()}
+                for result, play in zip(results, plays, strict=True)
+            ],
             "differences": {name: asdict(pair) for name, pair in pairs.items()},
         }
         console.print_json(json.dumps(data))
@@ -88,6 +97,31 @@ def run(
             soft_wrap=True,
             highlight=False,
         )
+
+
+@suite.command()
+@in_environment
+def watch(
+    player: Player,
+    name: Annotated[
+        str, typer.Argument(metavar="SUITE", help="Name or file of a suite.")
+    ],
+    environment: SimulationOptions,
+    piece: Annotated[int, typer.Option(help="Number of the first piece.", min=0)] = 0,
+    pieces: Annotated[int, typer.Option(help="Number of pieces.", min=1)] = 1,
+    video: Video = None,
+) -> None:
+    """Show pieces of a suite, or write a video of them.
+
+    The driver "solution" repeats the stored actions that solve each piece.
+    """
+    keywords = environment.keywords
+    chosen = load_suite(name, **keywords.pop("options", {}))
+    found = Solution(name) if player == "solution" else player
+    driver, scenario, given = chosen.prepare(found, **keywords)
+    show_episodes(scenario, driver, given, piece, pieces, video)
+    if video is not None:
+        console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
 
 
 def table_of(results: list[SuiteResult]) -> Table:

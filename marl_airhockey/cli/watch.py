@@ -9,7 +9,7 @@ import typer
 
 from marl_airhockey.cli import hosting
 from marl_airhockey.cli.environment import EnvironmentOptions, in_environment
-from marl_airhockey.cli.options import Scenario, console
+from marl_airhockey.cli.options import Scenario, Video, console
 from marl_airhockey.data.files import is_recording
 
 
@@ -26,12 +26,7 @@ def watch(
     scenario: Scenario = None,
     seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = 0,
     episodes: Annotated[int, typer.Option(help="Number of episodes.", min=1)] = 1,
-    video: Annotated[
-        Path | None,
-        typer.Option(
-            help="Video to write instead of opening a window: .gif, .webp or .mp4."
-        ),
-    ] = None,
+    video: Video = None,
     viewpoint: Annotated[
         str,
         typer.Option(

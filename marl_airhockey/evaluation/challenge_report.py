@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-PROTOCOL = 4
+PROTOCOL = 5
 """Number of the protocol. It is increased whenever the challenge changes, because cards
 of different protocols are not comparable."""
 

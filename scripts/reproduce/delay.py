@@ -39,7 +39,7 @@ METHODS: dict[str, dict[str, Any]] = {
     "history": {**SAMPLED, "observe": "history"},
 }
 """Settings by method."""
-TASKS = ("juggle",)
+TASKS = ("juggle", "hit_goal")
 LATENCIES = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25)
 SUITES, PLAYERS = ("defence-v1", "played-v1"), ("zoo/duel", "goalkeeper", "allround")
 REACTIONS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4)

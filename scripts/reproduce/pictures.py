@@ -3,7 +3,7 @@
     python scripts/reproduce/pictures.py --out docs/images
     python scripts/reproduce/pictures.py --out docs/images --arm
 
-The first command writes ``tasks.png``, ``games.png`` and ``set_pieces.png``, and the
+The first command writes ``tasks.png``, ``games.png`` and ``set_pieces.webp``, and the
 second ``arm.png``, a duel of two arms, which requires robosuite.
 """
 
@@ -23,6 +23,7 @@ from marl_airhockey.rollouts.play import play
 from marl_airhockey.sim.contracts.palette import LIGHT, rgb
 from marl_airhockey.sim.render.picture import draw
 from marl_airhockey.sim.render.renderer import Renderer
+from marl_airhockey.sim.render.video import write_video
 from marl_airhockey.types import Array
 
 COLUMNS, GAP = 2, 12
@@ -31,6 +32,8 @@ MOMENT = 1.9
 """Time of the image of a game, s."""
 MEDIUM = 3
 """Class of difficulty of the piece of a suite."""
+PAUSE, RATE = 20, 20.0
+"""Images that hold the end of a video, and images per second."""
 VIEWS = "frontview", "agentview", "birdview"
 SEEDS = range(2, 22)
 """Seeds that are played until an episode succeeds."""
@@ -60,8 +63,8 @@ def moment(name: str, width: int) -> Array:
     return draw(renderer.frame(), width if x > WIDE * y else round(0.75 * width))
 
 
-def solved_piece(name: str, width: int) -> Array:
-    """Return an image of the end of a piece of a suite, played by its solution."""
+def film_of(name: str, width: int) -> list[Array]:
+    """Return the images of a piece of a suite, played by its solution."""
     suite = ah.load_suite(name)
     drivers = {"paddle_0": Solution(name), **suite.drivers}
     world = ah.make_world(suite.scenario, drivers=drivers)
@@ -69,11 +72,22 @@ def solved_piece(name: str, width: int) -> Array:
     renderer = Renderer(world, "rgb_array", name)
     world.reset(int((suite.pieces.difficulty == MEDIUM).argmax()))
     renderer.begin()
-    for step in play(world):
+    images = []
+    for _ in play(world):
         renderer.follow()
-        if world.state.time[0] >= MOMENT / 2 or step.ended.any():
-            break
-    return draw(renderer.frame(), width)
+        images.append(draw(renderer.frame(), width))
+    return images
+
+
+def set_pieces(path: Path, width: int) -> None:
+    """Write a video with one piece of each suite, side by side."""
+    films = [film_of(name, width) for name in suite_names()]
+    longest = max(map(len, films)) + PAUSE
+    for film in films:
+        film += film[-1:] * (longest - len(film))
+    write_video(
+        path, [sheet(list(each), width) for each in zip(*films, strict=True)], RATE
+    )
 
 
 def arms(width: int, seconds: float = 1.5) -> Array:
@@ -126,7 +140,7 @@ def main(
     width: Annotated[int, typer.Option(help="Width of one image, px.")] = 560,
     arm: Annotated[bool, typer.Option("--arm", help="Only the image of arms.")] = False,
 ) -> None:
-    """Play all scenarios and suites, and write one image of each kind."""
+    """Play all scenarios, write one image of each kind, and a video of the suites."""
     out.mkdir(parents=True, exist_ok=True)
     if arm:
         save(out / "arm.png", arms(320))
@@ -135,9 +149,9 @@ def main(
     for name in ah.scenario_names():
         alone = len(ah.make_scenario(name).scene.seats) == 1
         kinds["tasks" if alone else "games"].append(moment(name, width))
-    kinds["set_pieces"] = [solved_piece(name, width) for name in suite_names()]
     for kind, pictures in kinds.items():
         save(out / f"{kind}.png", sheet(pictures, width))
+    set_pieces(out / "set_pieces.webp", width)
 
 
 if __name__ == "__main__":

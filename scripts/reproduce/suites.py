@@ -4,13 +4,15 @@
     python scripts/reproduce/suites.py --make defence-v1 --out pieces
 
 A suite is made from random candidates. A piece is selected if a paddle at rest fails, a
-random paddle fails in at least 4 of 5 plays, and a search finds actions that solve it.
-The search plays scripts, and policies with sampled actions, and stores the first
-actions that succeed. It knows the puck when it is hidden. The class of a piece is given
-by the share of plays of the population of the challenge that solve it, whose players no
-table shows: the classes are equal ranges of this share, up to that of the easiest
-pieces. In doubles, there is no population, and the levels of the zoo replace it. A
-changed suite needs a new name, and its hash belongs in `evaluation/suites/pieces.py`.
+random paddle fails in at least 4 of 5 plays (in rally, in all of them), and a search
+finds actions that solve it. The search plays scripts, and policies with sampled
+actions, and stores the first actions that succeed. It knows the puck when it is hidden.
+
+The class of a piece is given by the share of plays of the population of the challenge
+that solve it, whose players no table shows: the classes are equal ranges of this share,
+up to that of the easiest pieces. In doubles, there is no population, and the levels of
+the zoo replace it. A changed suite needs a new name, and its hash belongs in
+`evaluation/suites/pieces.py`.
 """
 
 from __future__ import annotations
@@ -76,6 +78,8 @@ class Recipe:
     starts: Callable[[np.random.Generator, int], Starts]
     hides: bool = False
     """True to hide the puck for 0.1 to 0.3 s of its flight."""
+    lucky: int = 1
+    """Number of 5 plays of a random paddle that may solve a piece."""
 
 
 # Opponents are scripts: the last bits of a network's actions depend on the processor
@@ -106,6 +110,11 @@ RECIPES = {
         task_of("Concede no goal in a game.", "keep", 4.0, {"paddle_1": "allround"}),
         played,
     ),
+    "rally-v1": Recipe(
+        task_of("Return the puck to the other paddle.", "pass", 4.0, KEEPER),
+        counters,
+        lucky=0,
+    ),
     "pass-v1": Recipe(
         task_of("Pass the puck to the teammate.", "pass", 4.0, TEAMS, "doubles"), passes
     ),
@@ -128,7 +137,7 @@ def candidates(recipe: Recipe, rng: np.random.Generator, path: Path) -> Suite:
     if recipe.hides:
         suite = saved(with_hidden_pucks(suite, rng), path)
     solved = np.sum([suite.play("random", k).solved for k in range(5)], axis=0)
-    return saved(suite.pieces.select(solved <= 1), path)
+    return saved(suite.pieces.select(solved <= recipe.lucky), path)
 
 
 def with_hidden_pucks(suite: Suite, rng: np.random.Generator) -> Pieces:

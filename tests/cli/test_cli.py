@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import airhockey
+from PIL import Image
 
 import marl_airhockey as ah
 from marl_airhockey.envs.meanings import term_meanings
@@ -296,12 +297,21 @@ def test_suites_are_listed_and_two_drivers_compared():
     found = json.loads(airhockey(*words, "--json").stdout)
     still, keeper = found["results"]
     assert still["success"] == 0.0
+    assert sum(keeper["solved"]) == keeper["success"] * 1000
     (pair,) = found["differences"].values()
     assert pair["only_second"] == keeper["success"] * 1000
     assert pair["p_value"] < 1e-6
     slow = (*words[:2], "goalkeeper", "defence-v1", "--option", "reaction=0.4")
     (late,) = json.loads(airhockey(*slow, "--json").stdout)["results"]
     assert late["success"] < keeper["success"]
+
+
+def test_pieces_of_a_suite_become_a_video(tmp_path):
+    video = tmp_path / "piece.gif"
+    words = "suite", "watch", "solution", "defence-v1", "--piece", "3"
+    assert "wrote" in airhockey(*words, "--pieces", "2", "--video", video).stdout
+    with Image.open(video) as shown:
+        assert shown.n_frames > 20
 
 
 def test_a_league_with_another_seed_plays_other_games(tmp_path):

@@ -25,6 +25,7 @@ SHA256 = {
     "defence-v1": "b938b1a65a3a7ed96ce2c9dfcd01e810888ab28b62c9a46f764b75980a777e08",
     "pass-v1": "83921eedaed27bc3b7863aca96d680b5b4946ee477cef2900adfd00ee73f3097",
     "played-v1": "dbd0d978da3b3e62b81254f657c2ba27d09c654256998fcb7b79a1e0562635dd",
+    "rally-v1": "94aa2afddc6d15827e65d04e4143620bee140379005a509fa10710dbfac87786",
 }
 """Hash of the file of each published suite."""
 SEATS = {"duel": 2, "doubles": 4}

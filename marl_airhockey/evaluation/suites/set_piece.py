@@ -157,7 +157,7 @@ def score(t: Transition, over: Array) -> Array:
 
 
 def hand_over(t: Transition, over: Array) -> Array:
-    """Return True (...) if the teammate touches the puck next after ``paddle_0``."""
+    """Return True (...) if ``paddle_1`` touches the puck next after ``paddle_0``."""
     before, after = t.memory["toucher"], t.new_memory["toucher"]
     passed: Array = ((before == 1.0) & (after == 2.0)).any(-1)
     return passed

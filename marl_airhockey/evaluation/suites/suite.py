@@ -30,6 +30,7 @@ from marl_airhockey.registry import (
 from marl_airhockey.rollouts.as_trained import as_trained, seen_in
 from marl_airhockey.rollouts.rollout import play_episodes
 from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
 
@@ -181,15 +182,10 @@ class Suite:
         Raises:
             ValueError: The driver cannot play, or needs another observation.
         """
-        driver, backend = make_driver(player), keywords.get("backend", DEFAULT_BACKEND)
-        _check(driver, backend, keywords)
-        form = keywords.get("observe") or driver.observe or "velocity"
-        requested: Keywords = {**keywords, "drivers": {**self.drivers}, "observe": form}
-        name = name_of(player, driver)
-        scenario, given = as_trained({name: driver}, self.scenario, requested)
-        n = len(self)
+        n, backend = len(self), keywords.get("backend", DEFAULT_BACKEND)
         at_once = n if backend == DEFAULT_BACKEND else min(n, AT_ONCE)
-        world = build_driven_world(seen_in(driver, given), scenario, at_once, given)
+        driver, scenario, given = self.prepare(player, **keywords)
+        world = build_driven_world(driver, scenario, at_once, given)
         try:
             episodes = list(play_episodes(world, n, number * n, COLUMNS))
         finally:
@@ -202,6 +198,26 @@ class Suite:
             np.array([(e.columns["violation"][:, 0, -1] > 0).mean() for e in episodes]),
             {**keywords, **({"options": self.options} if self.options else {})},
         )
+
+    def prepare(
+        self, player: object, **keywords: Unpack[Keywords]
+    ) -> tuple[Driver, str | Scenario, Keywords]:
+        """Return a driver, and the scenario and keywords with which it plays.
+
+        Args:
+            player: Driver of ``paddle_0``, see `registry.make_driver`.
+            **keywords: Keywords of the environment, such as ``backend``.
+
+        Raises:
+            ValueError: The driver cannot play, or needs another observation.
+        """
+        driver, backend = make_driver(player), keywords.get("backend", DEFAULT_BACKEND)
+        _check(driver, backend, keywords)
+        form = keywords.get("observe") or driver.observe or "velocity"
+        requested: Keywords = {**keywords, "drivers": {**self.drivers}, "observe": form}
+        name = name_of(player, driver)
+        scenario, given = as_trained({name: driver}, self.scenario, requested)
+        return seen_in(driver, given), scenario, given
 
     def summarize(self, name: str, played: SuitePlay) -> SuiteResult:
         """Return the result of a driver with a name.
