@@ -214,7 +214,7 @@ def _extras(world: World) -> Iterator[Extra]:
     step, observer = world.control_step, world.observer
     # The current moment is moment 0.
     moments = step.now, step.moments[1 - step.current]
-    if world.sensor.ideal:
+    if world.sensor.ideal and not observer.images:
         state = step.now.state, step.now.verdict.memory
         yield Extra("observe", *observer.detached(*state, observer.observe))
     show = Fused(partial(_shown, world), f"display of {world.scenario.name}")

@@ -35,6 +35,13 @@ def bench_environments(
             "environment of one world."
         ),
     ] = "0,1,64,1024,4096",
+    observe: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Observation type, by default velocity. Can be repeated; images are "
+            "pixels or pixels:size=64,colour=rgb,frames=1."
+        ),
+    ] = None,
     rounds: Annotated[
         int,
         typer.Option(help="Number of rounds; each round measures every case once."),
@@ -63,9 +70,10 @@ def bench_environments(
             "above 0"
         )
     cases = [
-        Case(s, b, n)
+        Case(s, b, n, o)
         for s in scenario.split(",")
         for b in backend.split(",")
+        for o in observe or ["velocity"]
         for n in numbers
     ]
     with bar() as progress:
@@ -80,7 +88,7 @@ def bench_environments(
     table = Table(
         title=f"{rounds} rounds of {seconds} CPU-s, {rates[0].threads} threads"
     )
-    for name in ("scenario", "backend", ""):
+    for name in ("scenario", "backend", "observe", ""):
         table.add_column(name)
     for name in ("env-steps per CPU-s", "agent-steps per CPU-s", "per s", "spread"):
         table.add_column(name, justify="right")
@@ -89,6 +97,7 @@ def bench_environments(
         table.add_row(
             rate.case.scenario,
             rate.case.backend,
+            rate.case.observe,
             rate.case.name,
             *(f"{speed:,.0f}" for speed in (*speeds, rate.env_steps_per_s)),
             f"{rate.spread:.0%}",

@@ -32,6 +32,8 @@ STEPS = 2000
 """Number of control steps of a game."""
 SEED = 20261128
 """Seed of all games."""
+IMAGES = "pixels:colour=rgb,frames=2"
+"""Observation type of the games with images."""
 SCRIPT = "allround"
 """Script that plays in every scenario."""
 
@@ -45,10 +47,12 @@ class FixedGame(NamedTuple):
 
 
 def games() -> Iterator[FixedGame]:
-    """Yield all games: scripts, random actions in "ur5e", and policies of the zoo."""
+    """Yield all games: scripts, images, "ur5e", and policies of the zoo."""
     for scenario in scenario_names():
         scripted = Keywords(drivers=_drivers(scenario, SCRIPT))
         yield FixedGame(f"{scenario} with {SCRIPT}", scenario, scripted)
+        images = Keywords(observe=IMAGES)
+        yield FixedGame(f"{scenario} with images", scenario, images)
         keywords = Keywords(profile="ur5e")
         yield FixedGame(f"{scenario} with random actions in ur5e", scenario, keywords)
     for name in zoo_names():

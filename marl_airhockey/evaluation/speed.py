@@ -16,6 +16,7 @@ import numpy as np
 
 from marl_airhockey.make import make_world, parallel_env
 from marl_airhockey.sim.jit.threads import threads
+from marl_airhockey.sim.world.keywords import Keywords
 
 NUM_ACTIONS = 64
 """Number of different actions, which are sampled in advance."""
@@ -31,6 +32,8 @@ class Case:
     scenario: str
     backend: str
     worlds: int
+    observe: str = "velocity"
+    """Observation type."""
 
     @property
     def name(self) -> str:
@@ -61,6 +64,7 @@ class StepRate:
             "scenario": self.case.scenario,
             "backend": self.case.backend,
             "worlds": self.case.worlds,
+            "observe": self.case.observe,
             "agents": self.agents,
             "threads": self.threads,
             "env_steps_per_cpu_s": self.env_steps_per_cpu_s,
@@ -106,8 +110,9 @@ def _stepper(case: Case) -> tuple[Callable[[], int], int]:
         agents.
     """
     rng = np.random.default_rng(0)
+    keywords = Keywords(backend=case.backend, observe=case.observe)
     if case.worlds == 0:
-        env = parallel_env(case.scenario, backend=case.backend)
+        env = parallel_env(case.scenario, **keywords)
         env.reset(seed=0)
         agents = env.possible_agents
         rows = [
@@ -126,7 +131,7 @@ def _stepper(case: Case) -> tuple[Callable[[], int], int]:
         step_env()
         return step_env, len(agents)
 
-    world = make_world(case.scenario, case.worlds, backend=case.backend)
+    world = make_world(case.scenario, case.worlds, **keywords)
     world.reset(0)
     calls = max(1, min(NUM_ACTIONS, 4096 // case.worlds))
     actions = rng.uniform(-1, 1, (NUM_ACTIONS, case.worlds, len(world.open), 2))
@@ -156,20 +161,19 @@ def plot_speed(rates: Sequence[StepRate], path: Path) -> None:
     """Plot environment steps per CPU-second against the number of worlds."""
     from marl_airhockey.sim.render.charts import panels, save, series
 
-    names = sorted({(r.case.scenario, r.case.backend) for r in rates})
+    kinds = [(r.case.scenario, r.case.backend, r.case.observe) for r in rates]
     figure, grid = panels(size=(7.2, 4.6))
     axes = grid[0, 0]
-    for k, (scenario, backend) in enumerate(names):
+    for k, kind in enumerate(sorted(set(kinds))):
         mine = [
             r
-            for r in rates
-            if (r.case.scenario, r.case.backend) == (scenario, backend)
-            and r.case.worlds
+            for r, own in zip(rates, kinds, strict=True)
+            if own == kind and r.case.worlds
         ]
         mine.sort(key=lambda r: r.case.worlds)
         worlds = [r.case.worlds for r in mine]
         speed, look = [r.env_steps_per_cpu_s for r in mine], series(k)
-        axes.plot(worlds, speed, label=f"{scenario}, {backend}", **look.style)
+        axes.plot(worlds, speed, label=", ".join(kind), **look.style)
     axes.set(
         xscale="log", yscale="log", xlabel="worlds", ylabel="env-steps per CPU-second"
     )

@@ -1,6 +1,6 @@
-"""Input layer of the networks of stable-baselines3.
+"""Input layers of the networks of stable-baselines3.
 
-Saved models refer to the class by the name of this module.
+Saved models refer to the classes by the name of this module.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from typing import Any
 import torch
 from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+
+from marl_airhockey.learn.image_networks import small_layers
 
 
 class FixedScale(BaseFeaturesExtractor):
@@ -43,3 +45,23 @@ class FixedScale(BaseFeaturesExtractor):
         flat = (observations["observation"] - self.centre) * self.rate
         goals = [observations["achieved_goal"], observations["desired_goal"]]
         return torch.cat([flat, *goals], dim=-1)
+
+
+class ImageFeatures(BaseFeaturesExtractor):
+    """Convolutional layers of the small network.
+
+    Args:
+        observation_space: Box (channels, H, W) of images.
+    """
+
+    def __init__(self, observation_space: spaces.Box) -> None:
+        layers = small_layers(observation_space.shape[0])
+        with torch.no_grad():
+            size = layers(torch.zeros(1, *observation_space.shape)).shape[1]
+        super().__init__(observation_space, size)
+        self.layers = layers
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        """Return the features (B, size) of images (B, channels, H, W), 0 to 1."""
+        found: torch.Tensor = self.layers(observations)
+        return found

@@ -31,6 +31,12 @@ class Graph:
         self._constants.append(numpy_helper.from_array(array, name))
         return name
 
+    def integers(self, name: str, value: list[int]) -> str:
+        """Add a constant list of integers; return its name."""
+        array = np.array(value, np.int64)
+        self._constants.append(numpy_helper.from_array(array, name))
+        return name
+
     def node(self, kind: str, *inputs: str, **attributes: Any) -> str:
         """Add an operation on values; return the name of its result."""
         name = f"value_{len(self._nodes)}"

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 from marl_airhockey.learn.self_play_config import SelfPlayConfig
 from marl_airhockey.learn.settings import check_names
 from marl_airhockey.registry import find_scenario
+from marl_airhockey.sim.contracts.image_form import shows_images
 from marl_airhockey.sim.core.profiles import SUFFIX, find_profile
 
 
@@ -108,7 +109,7 @@ class PPOConfig(SelfPlayConfig):
     @staticmethod
     def needs_sb3(observe: str, options: Mapping[str, Any]) -> bool:
         """Return True if only the engine sb3 learns from an observation type."""
-        return observe == "pixels" or options.get("goals") == "dict"
+        return shows_images(observe) or options.get("goals") == "dict"
 
     def _check_rllib(self) -> None:
         if self.device != "cpu":

@@ -33,7 +33,7 @@ class RunConfig:
     profile: str = "ideal"
     """Name or file of the profile of sensing and actuation."""
     observe: str = "velocity"
-    """Observation type: "velocity", "estimate", "history" or "pixels"."""
+    """Observation type, see `observable.OBSERVE`."""
     options: dict[str, Any] = field(default_factory=dict)
     """Options of the scenario, by name."""
     drivers: dict[str, str] = field(default_factory=dict)

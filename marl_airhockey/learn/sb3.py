@@ -26,13 +26,14 @@ from marl_airhockey.learn.engine import (
 )
 from marl_airhockey.learn.evaluate_policy import Metrics
 from marl_airhockey.learn.logs import RunLog
-from marl_airhockey.learn.network import FixedScale
+from marl_airhockey.learn.network import FixedScale, ImageFeatures
 from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import SelfPlayEnv, make_training_env
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import Policy
 from marl_airhockey.policies.sb3 import load_weights, numpy_actor
+from marl_airhockey.sim.contracts.image_form import image_form, shows_images
 
 NEVER = 10**9
 """Number of rollouts between two rows that a model writes automatically. It is large,
@@ -100,7 +101,9 @@ class SB3Trainer:
     def _evaluate(self) -> Metrics:
         """Evaluate and save the policy; return the row of the evaluation."""
         run, model = self._run, self._model
-        shape, observe = model.observation_space.shape, run.config.observe
+        observe, shape = run.config.observe, model.observation_space.shape
+        if shows_images(observe):  # The model's own space has the channels first.
+            shape = image_form(observe).shape
         make = partial(Policy, partial(_predict, model), shape, observe, "training")
         row = evaluate_and_record(run, make, model.logger, self._save)
         if run.config.self_play:
@@ -112,8 +115,18 @@ class SB3Trainer:
         draft = folder / f"part-{name}.zip"
         self._model.save(draft)
         draft.replace(folder / f"{name}.zip")
-        if self._run.config.observe != "pixels":
+        if not shows_images(self._run.config.observe):
             self._to_numpy().save(folder / f"{name}.npz")
+            return
+        from marl_airhockey.learn.image_export import save_image_policy
+
+        network: Any = self._model.policy
+        card = vars(self._model)["card"]
+        seen, hidden = network.features_extractor, network.mlp_extractor.policy_net
+        layers = torch.nn.Sequential(seen.layers, hidden, network.action_net)
+        shape = image_form(self._run.config.observe).shape
+        card = {**card, "steps": self._model.num_timesteps}
+        save_image_policy(layers, shape, card, folder / f"{name}.onnx")
 
 
 def learn_for(model: BaseAlgorithm, steps: int, slots: SlotEnv) -> None:
@@ -167,9 +180,10 @@ def make_logger(folder: Path, steps: int) -> Logger:
 def build_model(config: PPOConfig, env: AirHockeyVecEnv) -> PPO:
     """Build a new PPO model for an environment, with its card as ``model.card``."""
     layout = env.world.observer.layout
-    policy, extra = "MlpPolicy", {}
-    if config.observe == "pixels":
+    policy, extra = "MlpPolicy", dict[str, Any]()
+    if shows_images(config.observe):
         policy = "CnnPolicy"
+        extra = {"features_extractor_class": ImageFeatures}
     else:
         policy = "MultiInputPolicy" if config.options.get("goals") else policy
         extra = {

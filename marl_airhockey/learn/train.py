@@ -35,6 +35,7 @@ from marl_airhockey.policies.load import load_policy
 from marl_airhockey.policies.trust import trust_code
 from marl_airhockey.registry import find_scenario, make_driver
 from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.image_form import shows_images
 from marl_airhockey.sim.core.errors import require, unknown_name
 
 
@@ -169,11 +170,12 @@ def _continuation(
     Raises:
         ValueError: An engine or an opponent is unknown.
     """
+    if shows_images(config.observe):
+        require("onnx", "offline")
     if isinstance(config, OfflineConfig):
         require("torch", "train")
         require("tensorboard", "train")
-        if config.observe == "pixels":
-            require("onnx", "offline")
+        if shows_images(config.observe):
             from marl_airhockey.learn.offline.pixels import clone_from_pixels as learn
         else:
             from marl_airhockey.learn.offline.learner import train_offline as learn

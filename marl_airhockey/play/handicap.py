@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 
 from marl_airhockey.sim.contracts.driver import Driver, View
+from marl_airhockey.sim.contracts.image_form import shows_images
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.seat import Seat
 from marl_airhockey.sim.core.state import State
@@ -91,7 +92,8 @@ class HandicappedDriver(Driver):
         self.observe = self.inner.observe
         trained = self.inner.trained_in.get("control_dt")
         self.control_dt = self.inner.control_dt or trained or OWN_PACE
-        if self.handicap.observes and self.observe in ("history", "pixels"):
+        past = self.observe == "history" or shows_images(self.observe)
+        if self.handicap.observes and past:
             raise ValueError(
                 f"reaction and noise must be 0 for a driver with observe={self.observe}"
             )

@@ -13,6 +13,7 @@ from marl_airhockey.play.match_drivers import MatchDrivers
 from marl_airhockey.play.messages import description, drawn, events
 from marl_airhockey.play.tally import Tally
 from marl_airhockey.rollouts.columns import first_columns
+from marl_airhockey.sim.contracts.image_form import shows_images
 from marl_airhockey.sim.contracts.observable import OBSERVE
 from marl_airhockey.sim.core.recording import Columns
 from marl_airhockey.sim.core.seat import Seat
@@ -208,9 +209,9 @@ class LiveMatch:
             self._next_episode()
 
     def _build(self) -> World:
-        # Policies with any observation type can take a seat at any time, except pixels,
+        # Policies with any observation type can take a seat at any time, except images,
         # which no policy of the zoo uses.
-        forms = [form for form in OBSERVE if form != "pixels"]
+        forms = [form for form in OBSERVE if not shows_images(form)]
         return build_world(self.scenario, 1, False, self.keywords, forms)
 
     def pause(self, reason: str = "") -> None:

@@ -17,6 +17,7 @@ from marl_airhockey.policies.policy import Policy, policy_driver, trained_in
 from marl_airhockey.policies.runs import check_run_format
 from marl_airhockey.policies.torch_weights import policy_of_weights
 from marl_airhockey.policies.trust import require_trust
+from marl_airhockey.sim.contracts.image_form import image_form, shows_images
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.types import Array
 
@@ -44,7 +45,7 @@ def load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
     card = data.get("card")
     if isinstance(card, dict):  # A zip of this library.
         check_run_format(path, card.get("run_format", 1))
-        if card.get("observe") != "pixels":
+        if not shows_images(card.get("observe")):
             own = numpy_actor(load_weights(path), card)
             return policy_driver(own, str(path), deterministic)
     require_trust(path, trust)
@@ -63,11 +64,13 @@ def load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
     if model.action_space.shape != (2,):
         raise ValueError(f"{path}: action space {model.action_space}; expected (2,)")
     card = getattr(model, "card", {})
-
+    observe, shape = card.get("observe"), model.observation_space.shape
+    if shows_images(observe):  # The model's own space has the channels first.
+        shape = image_form(observe).shape
     return Policy(
         partial(_predict_sb3, model.policy),
-        model.observation_space.shape,
-        card.get("observe"),
+        shape,
+        observe,
         str(path),
         deterministic,
         trained_in=model_environment(model),

@@ -99,13 +99,19 @@ class Replay:
     Args:
         recording: Recording with the episodes, which all have steps.
         scenario: Scenario whose rules are applied; None for the recorded one.
+        observe: Observation type; None for the recorded one.
 
     Raises:
         ValueError: The scene differs from the recorded one, or the recording lacks data
             that the scenario needs. The message names the reason.
     """
 
-    def __init__(self, recording: Recording, scenario: Scenario | None = None) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        scenario: Scenario | None = None,
+        observe: str | None = None,
+    ) -> None:
         head, episodes = recording.head, recording.episodes
         own = scenario_of(recording)
         self.scenario = game = scenario or own
@@ -127,7 +133,7 @@ class Replay:
             [_padded_rows(e.columns["action"], steps) for e in episodes], 1
         )
         physics = _physics(head, episodes, game, played)
-        form = str(head.get("observe", "velocity"))
+        form = observe or str(head.get("observe", "velocity"))
         cycles = int(head["max_cycles"]) if self._same else None
         self.world = World(game, backend, {}, physics, (form,), cycles, autoreset=False)
         """Worlds of the episodes, with all seats open."""

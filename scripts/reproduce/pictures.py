@@ -3,8 +3,9 @@
     python scripts/reproduce/pictures.py --out docs/images
     python scripts/reproduce/pictures.py --out docs/images --arm
 
-The first command writes ``tasks.png``, ``games.png`` and ``set_pieces.webp``, and the
-second ``arm.png``, a duel of two arms, which requires robosuite.
+The first command writes ``tasks.png``, ``games.png``, ``image_observations.png`` and
+``set_pieces.webp``. The second one writes ``arm.png``, a duel of two arms, which
+requires robosuite.
 """
 
 from __future__ import annotations
@@ -32,6 +33,10 @@ MOMENT = 1.9
 """Time of the image of a game, s."""
 MEDIUM = 3
 """Class of difficulty of the piece of a suite."""
+OBSERVED = ("hit_goal", "duel", "free_for_all")
+"""Scenarios whose images are shown."""
+IMAGES, SEEN = "pixels:colour=rgb,frames=1", 3
+"""Observation type and seed of these images."""
 PAUSE, RATE = 20, 20.0
 """Images that hold the end of a video, and images per second."""
 VIEWS = "frontview", "agentview", "birdview"
@@ -88,6 +93,22 @@ def set_pieces(path: Path, width: int) -> None:
     write_video(
         path, [sheet(list(each), width) for each in zip(*films, strict=True)], RATE
     )
+
+
+def observations(scale: int = 4) -> Array:
+    """Return an image of what seats observe as images, enlarged."""
+    shown = []
+    for name in OBSERVED:
+        seats = len(ah.make_scenario(name).scene.seats)
+        drivers = {f"paddle_{i}": "allround" for i in range(1, seats)}
+        world = ah.make_world(name, drivers=drivers, observe=IMAGES)
+        world.reset(SEEN)
+        for _ in range(20):
+            world.step(np.zeros((1, 1, 2)))
+        image = np.asarray(world.observe(np.array([0])))[0, 0]
+        shown.append(image.repeat(scale, 0).repeat(scale, 1))
+    gap = np.full((len(shown[0]), GAP, 3), 255, np.uint8)
+    return np.hstack([part for image in shown for part in (image, gap)][:-1])
 
 
 def arms(width: int, seconds: float = 1.5) -> Array:
@@ -152,6 +173,7 @@ def main(
     for kind, pictures in kinds.items():
         save(out / f"{kind}.png", sheet(pictures, width))
     set_pieces(out / "set_pieces.webp", width)
+    save(out / "image_observations.png", observations())
 
 
 if __name__ == "__main__":

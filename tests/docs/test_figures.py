@@ -264,6 +264,30 @@ def test_set_pieces_have_the_shares_of_their_rows():
         assert line["solvable"] == f"{task.solvable:.2f}"
 
 
+def test_speed_of_images_is_that_of_its_rows():
+    rows = json.loads((DATA / "images.json").read_text())
+    titles = {
+        "velocity": "velocities",
+        "pixels": "three grey frames",
+        "pixels:colour=rgb,frames=1": "one colour frame",
+    }
+    rates = {
+        (r["scenario"], str(r["worlds"]), titles[r["observe"]]): r[
+            "agent_steps_per_cpu_s"
+        ]
+        for r in rows
+    }
+    shown = table("docs/image_observations.md", "scenario", "worlds")
+    assert len(shown) * len(titles) == len(rates)
+    for line in shown:
+        scenario, worlds, *_ = line.values()
+        for title in titles.values():
+            assert line[title] == f"{rates[scenario, worlds, title]:,.0f}"
+    spreads = [100 * row["spread"] for row in rows]
+    text = " ".join(Path("docs/image_observations.md").read_text().split())
+    assert f"{min(spreads):.0f} to {max(spreads):.0f} % of the median" in text
+
+
 def test_success_by_latency_is_that_of_its_rows():
     found = script("reproduce/delay.py")
     groups = found["groups"](rows_of("delay.csv"))

@@ -11,8 +11,10 @@ import torch
 import marl_airhockey as ah
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
+from marl_airhockey.learn.image_export import save_image_policy
+from marl_airhockey.learn.image_networks import NETWORKS, ImageActor
 from marl_airhockey.learn.offline.config import offline_config
-from marl_airhockey.learn.offline.pixels import PixelActor, render_pictures
+from marl_airhockey.learn.offline.pixels import recorded_steps, shifted
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.registry import make_driver
 
@@ -32,29 +34,33 @@ def expert(tmp_path_factory):
     return folder
 
 
-def test_pictures_of_a_recording_are_those_that_pixels_show(expert):
-    scene = ah.make_scenario("hit_goal").scene
-    data = render_pictures([expert], scene, 0, 1.0)
-    env = ah.gym_env("hit_goal", observe="pixels")
+@pytest.mark.parametrize("profile", ["ideal", "gantry"])
+def test_images_of_a_recording_are_those_that_were_observed(tmp_path, profile):
+    player, keywords = make_driver("zoo/hit_goal"), {"profile": profile}
+    form = {"observe": "velocity"} if profile == "ideal" else {}
+    path = record_episodes(
+        player, "zoo", "hit_goal", 3, tmp_path / "a", 3, {**keywords, **form}
+    )
+    data = recorded_steps([path], "pixels:size=64", 0, 1.0)
+    env = ah.gym_env("hit_goal", observe="pixels:size=64", **keywords)
     row = 0
     for seed in (3, 4, 5):
         seen, _ = env.reset(seed=seed)
         done = False
         while not done:
-            shown = data.frames[data.shown[row]].permute(1, 2, 0).numpy()
-            np.testing.assert_array_equal(shown, seen)
-            seen, _, terminated, truncated, _ = env.step(data.action[row].numpy())
+            images, actions = data.at(np.array([row]))
+            np.testing.assert_array_equal(images[0], seen)
+            seen, _, terminated, truncated, _ = env.step(actions[0])
             done, row = terminated or truncated, row + 1
     assert row == len(data.action)
 
 
-def test_a_share_of_the_pictures_is_of_the_best_episodes(expert):
-    scene = ah.make_scenario("hit_goal").scene
+def test_a_share_of_the_steps_is_of_the_best_episodes(expert):
     episodes = read_recording(expert).episodes
     best = max(episodes, key=lambda e: e.columns["reward"].sum())
-    data = render_pictures([expert], scene, 0, 0.34)
+    data = recorded_steps([expert], "pixels", 0, 0.34)
     np.testing.assert_array_equal(
-        data.action.numpy(),
+        data.action,
         best.columns["action"][:, 0].astype(np.float32).clip(-1, 1),
     )
 
@@ -75,7 +81,7 @@ def test_a_run_from_pixels_goes_on_and_leaves_an_onnx_policy(expert, tmp_path):
     policy = ah.load_policy(tmp_path / "last.onnx")
     assert (policy.observe, policy.shape) == ("pixels", (84, 84, 3))
     weights = torch.load(tmp_path / "last.pt", weights_only=True)
-    actor = PixelActor([16])
+    actor = ImageActor((84, 84, 3), "small", [16])
     actor.load_state_dict(weights["model"])
     pictures = np.random.default_rng(0).integers(0, 256, (5, 84, 84, 3), np.uint8)
     with torch.inference_mode():
@@ -88,8 +94,39 @@ def test_a_run_from_pixels_goes_on_and_leaves_an_onnx_policy(expert, tmp_path):
 def test_what_pixels_cannot_do_is_named(expert, tmp_path):
     with pytest.raises(ValueError, match="bc alone, not iql"):
         offline_config("iql", [expert], SMALL)
-    player = make_driver("zoo/touch")
-    keywords = {"profile": "ur5e"}
-    path = record_episodes(player, "x", "touch", 1, tmp_path / "b", 3, keywords)
-    with pytest.raises(ValueError, match="profile ideal"):
+    path = record_episodes(
+        make_driver("still"), "x", "hit_goal", 1, tmp_path, 3, {"goals": "dict"}
+    )
+    with pytest.raises(ValueError, match='goals="flat"'):
         offline_config("bc", [path], SMALL)
+
+
+@pytest.mark.parametrize("network", NETWORKS)
+def test_an_onnx_model_acts_like_its_network(network, tmp_path):
+    shape = (48, 48, 2)
+    torch.manual_seed(0)
+    actor = ImageActor(shape, network, [8])
+    for norm in (m for m in actor.modules() if isinstance(m, torch.nn.GroupNorm)):
+        torch.nn.init.normal_(norm.weight)
+        torch.nn.init.normal_(norm.bias)
+    card = {"observe": "pixels:size=48,frames=2"}
+    save_image_policy(actor.layers, shape, card, tmp_path / "a.onnx")
+    policy = ah.load_policy(tmp_path / "a.onnx")
+    images = np.random.default_rng(0).integers(0, 256, (3, *shape), np.uint8)
+    expected = actor.predict(images, True).clip(-1, 1)
+    np.testing.assert_allclose(policy.predict(images, True), expected, atol=1e-4)
+
+
+def test_an_unknown_network_is_named(expert, tmp_path):
+    config = offline_config("bc", [expert], {**SMALL, "network": "vit"})
+    with pytest.raises(ValueError, match="unknown network 'vit'"):
+        run_training(config, tmp_path)
+
+
+def test_shifted_images_are_crops_of_images_with_repeated_edges():
+    images = np.arange(25, dtype=np.uint8).reshape(1, 5, 5, 1).repeat(200, 0)
+    found = shifted(images, 2, np.random.default_rng(0))
+    padded = np.pad(images[0], ((2, 2), (2, 2), (0, 0)), "edge")
+    crops = [padded[y : y + 5, x : x + 5] for y in range(5) for x in range(5)]
+    seen = {crop.tobytes() for crop in found}
+    assert seen == {crop.tobytes() for crop in crops}

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 import torch
 from filelock import FileLock
@@ -154,6 +155,19 @@ def test_pixels_and_goals_are_learned_by_sb3(changes):
     assert preset("reach").engine == "torch"
     with pytest.raises(ValueError, match="torch learns from flat observations"):
         preset("reach", {**given, "options": options, "engine": "torch"})
+
+
+def test_ppo_from_images_leaves_a_policy_that_needs_no_trust(tmp_path):
+    observe = "pixels:size=36,frames=2"
+    tiny = {"total_steps": 256, "num_worlds": 4, "n_steps": 32, "batch_size": 64}
+    rest = {"observe": observe, "n_epochs": 1, "evaluations": 1, "eval_episodes": 2}
+    run_training(preset("touch", {**tiny, **rest}), tmp_path)
+    policy = load_policy(tmp_path)
+    assert (policy.observe, policy.shape) == (observe, (36, 36, 2))
+    trusted = load_policy(tmp_path / "last.zip", trust=True)
+    images = np.random.default_rng(0).integers(0, 256, (3, 36, 36, 2), np.uint8)
+    found, expected = policy.predict(images, True), trusted.predict(images, True)
+    np.testing.assert_allclose(found, np.clip(expected, -1, 1), atol=1e-4)
 
 
 def test_all_cpu_time_is_counted_by_kind(tmp_path):

@@ -16,6 +16,7 @@ from marl_airhockey.data.files import (
 )
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.settings import check_names
+from marl_airhockey.sim.contracts.image_form import shows_images
 from marl_airhockey.sim.core.errors import unknown_name
 
 STEPS = {"bc": 20_000, "iql": 40_000, "td3_bc": 40_000, "rebrac": 40_000}
@@ -35,7 +36,7 @@ class OfflineConfig(RunConfig):
     """
 
     MAY_BE_ZERO: ClassVar[tuple[str, ...]] = (
-        *("seed", "seat", "alpha", "critic_penalty", "target_noise"),
+        *("seed", "seat", "alpha", "critic_penalty", "target_noise", "shift"),
     )
     """Names of the number settings that may be 0."""
 
@@ -58,6 +59,11 @@ class OfflineConfig(RunConfig):
     """Discount per control step, above 0 and at most 1."""
     hidden: list[int]
     """Widths of the hidden layers, each above 0."""
+    network: str = "small"
+    """Convolutional layers before ``hidden``, if images are observed: "small" or
+    "resnet18", see `image_networks.NETWORKS`."""
+    shift: int = 0
+    """Largest random shift of images in training, pixels, 0 or more."""
     evaluations: int = 5
     """Number of evaluations during training, above 0."""
     eval_episodes: int = 200
@@ -129,7 +135,7 @@ def offline_config(
     files = whole_recordings_in([built(path) for path in data])
     head = shared_head(files)
     goals = {"goals": head["goals"]} if "goals" in head else {}
-    pixels = changes.get("observe", head["observe"]) == "pixels"
+    pixels = shows_images(changes.get("observe", head["observe"]))
     if pixels:
         _check_pixels(algo, head)
     for name in ("scenario", "options", "observe", "control_dt"):
@@ -165,15 +171,14 @@ def offline_config(
 
 
 def _check_pixels(algo: str, head: Mapping[str, Any]) -> None:
-    """Check that pixels can be rendered and that they are cloned.
+    """Check that images are cloned, and that the recordings have flat goals.
 
     Raises:
-        ValueError: The algorithm is not bc, or the recordings cannot be rendered.
+        ValueError: The algorithm is not bc, or the recordings have separate goals.
     """
     if algo != "bc":
         raise ValueError(f'observe: "pixels" are learned by bc alone, not {algo}')
-    if head["profile"] != "ideal" or "goals" in head:
+    if "goals" in head:
         raise ValueError(
-            'observe: "pixels" are rendered from states and need recordings of the '
-            'profile ideal with goals="flat"'
+            'observe: "pixels" need recordings with goals="flat", which show the goal'
         )

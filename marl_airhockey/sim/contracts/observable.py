@@ -25,15 +25,14 @@ OBSERVE = ("velocity", "estimate", "history", "pixels")
 ``velocity``: the sensed position and velocity. ``estimate``: position and velocity for
 now, estimated by a filter with a model of the table. ``history``: the last sensed
 positions, each with a visibility flag and the age of its frame, as from a camera.
-``pixels``: images."""
+``pixels``: images. Settings may follow, as in ``pixels:size=64,colour=rgb,frames=1``,
+see `image_form.ImageForm`."""
 
 
 HISTORY = 5
 """Number of sensed positions of a puck in a history."""
 PENDING = 2
 """Number of last actions in an observation, which may not have taken effect yet."""
-FRAMES = 3
-"""Number of stacked images in pixels."""
 
 
 class Element(NamedTuple):

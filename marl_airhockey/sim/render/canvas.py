@@ -7,12 +7,10 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from marl_airhockey.sim.contracts.palette import LIGHT, rgb
+from marl_airhockey.sim.contracts.look import ROOM, Colour, Shape
 from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
-Colour = tuple[int, int, int]
-"""Colour in RGB, 0 to 255."""
 SMOOTH = 2
 """Factor by which the canvas is larger than the image, for anti-aliasing."""
 SHIFT = 6
@@ -37,56 +35,34 @@ class Canvas:
         tall = round(float(high[1] - self.low[1]) * self.scale) + self.bar
         # Video codecs require even sizes.
         tall += -tall % (2 * SMOOTH)
-        self.image = np.full((tall, SMOOTH * width, 3), rgb(LIGHT["room"]), np.uint8)
+        self.image = np.full((tall, SMOOTH * width, 3), ROOM, np.uint8)
         self.bottom = tall
 
     def pixel(self, point: Sequence[float] | Array) -> tuple[int, int]:
         """Return the fixed-point pixel of a point (2,), table frame, m."""
-        x = (float(point[0]) - self.low[0]) * self.scale
-        y = self.bottom - (float(point[1]) - self.low[1]) * self.scale
+        # The centre of a pixel is half a pixel from its edge.
+        x = (float(point[0]) - self.low[0]) * self.scale - 0.5
+        y = self.bottom - (float(point[1]) - self.low[1]) * self.scale - 0.5
         return round(x * 2**SHIFT), round(y * 2**SHIFT)
 
-    def disc(
-        self, centre: Sequence[float] | Array, radius: float, colour: Colour
-    ) -> None:
-        """Draw a filled disc; centre (2,) and radius in m."""
-        size = max(round(radius * self.scale * 2**SHIFT), 1)
-        cv2.circle(self.image, self.pixel(centre), size, colour, -1, cv2.LINE_AA, SHIFT)
-
-    def ring(
-        self,
-        centre: Sequence[float] | Array,
-        radius: float,
-        colour: Colour,
-        width: float = 1.5,
-    ) -> None:
-        """Draw a circle; centre (2,) and radius in m, width of the line in pixels."""
-        size = max(round(radius * self.scale * 2**SHIFT), 1)
-        line = max(round(width * SMOOTH), 1)
-        cv2.circle(
-            self.image, self.pixel(centre), size, colour, line, cv2.LINE_AA, SHIFT
-        )
-
-    def line(
-        self,
-        start: Sequence[float] | Array,
-        end: Sequence[float] | Array,
-        colour: Colour,
-        width: float = 1.5,
-    ) -> None:
-        """Draw a straight line; ends (2,) in m, width in pixels."""
-        wide = max(round(width * SMOOTH), 1)
-        a, b = self.pixel(start), self.pixel(end)
-        cv2.line(self.image, a, b, colour, wide, cv2.LINE_AA, SHIFT)
-
-    def polygon(self, corners: Array, colour: Colour, width: float = 0.0) -> None:
-        """Fill a polygon (K, 2), m, or draw its outline with ``width`` in pixels."""
-        points = np.array([self.pixel(c) for c in corners], np.int32)
-        if width:
-            wide = max(round(width * SMOOTH), 1)
-            cv2.polylines(self.image, [points], True, colour, wide, cv2.LINE_AA, SHIFT)
+    def paint(self, shape: Shape) -> None:
+        """Draw a shape."""
+        line = max(round(shape.line * SMOOTH), 1) if shape.line else -1
+        points = [self.pixel(point) for point in shape.points]
+        style = shape.colour, line, cv2.LINE_AA, SHIFT
+        if len(points) == 1:
+            size = max(round(shape.radius * self.scale * 2**SHIFT), 1)
+            if shape.fill is not None:
+                disc = shape.fill, -1, cv2.LINE_AA, SHIFT
+                cv2.circle(self.image, points[0], size, *disc)
+            cv2.circle(self.image, points[0], size, *style)
+        elif len(points) == 2:
+            cv2.line(self.image, points[0], points[1], *style)
+        elif shape.line:
+            cv2.polylines(self.image, [np.array(points, np.int32)], True, *style)
         else:
-            cv2.fillPoly(self.image, [points], colour, cv2.LINE_AA, SHIFT)
+            corners = [np.array(points, np.int32)]
+            cv2.fillPoly(self.image, corners, shape.colour, cv2.LINE_AA, SHIFT)
 
     def titles(
         self, left: str, right: str, colours: tuple[Colour, Colour], size: float = 0.55

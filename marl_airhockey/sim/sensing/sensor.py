@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marl_airhockey.sim.contracts.observable import FRAMES, HISTORY, PENDING
+from marl_airhockey.sim.contracts.image_form import image_form, shows_images
+from marl_airhockey.sim.contracts.observable import HISTORY, PENDING
 from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.rng import StreamSet
 from marl_airhockey.sim.core.scene import Scene
@@ -23,6 +24,8 @@ class Needs(NamedTuple):
     """True to store the last sensed positions and requested actions."""
     estimate: bool
     """True to estimate the pucks for now by a filter."""
+    frames: int = 0
+    """Number of sensed positions of all bodies to store, for images."""
 
     @staticmethod
     def of(forms: Iterable[str]) -> Needs:
@@ -32,7 +35,9 @@ class Needs(NamedTuple):
             forms: Names of the observation types.
         """
         forms = set(forms)
-        return Needs(bool(forms - {"velocity"}), "estimate" in forms)
+        frames = [image_form(f).frames for f in forms if shows_images(f)]
+        history = bool(forms - {"velocity"})
+        return Needs(history, "estimate" in forms, max(frames, default=0))
 
 
 class Sensor:
@@ -69,8 +74,8 @@ class Sensor:
         (B, HISTORY, pucks, 4), newest last."""
         self.age = np.zeros((b, pucks))
         """Age of the simulated camera's newest frame of each puck (B, pucks), s."""
-        self.frames = np.zeros((b, FRAMES, len(scene.bodies), 2))
-        """Sensed positions of all bodies (B, FRAMES, N, 2), m, newest last."""
+        self.frames = np.zeros((b, needs.frames, len(scene.bodies), 3))
+        """Sensed positions, m, and angles of all bodies (B, F, N, 3), newest last."""
         self.requested = np.zeros((b, PENDING, scene.bodies.paddles, 2))
         """Last requested actions (B, PENDING, seats, 2), ego frames, newest last."""
 
@@ -149,7 +154,9 @@ class Sensor:
             sensed, self.age = self.camera.look(state, values, streams, rows)
         if self._keeps:
             self._append(self.history, self._newest(sensed), rows)
-            self._append(self.frames, sensed.position, rows)
+        if self.frames.shape[1]:
+            bodies = sensed.position, sensed.angle[..., None]
+            self._append(self.frames, np.concatenate(bodies, -1), rows)
         return sensed
 
     def _newest(self, sensed: State) -> Array:

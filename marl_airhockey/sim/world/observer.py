@@ -9,26 +9,24 @@ from typing import Any
 
 import numpy as np
 
+from marl_airhockey.sim.contracts.image_form import image_form
 from marl_airhockey.sim.contracts.observable import (
-    FRAMES,
-    OBSERVE,
     EgoView,
     ObservationContext,
     ObservationLayout,
 )
 from marl_airhockey.sim.contracts.scenario import GoalScenario, Scenario
-from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.jit.fused import Fused, Sink, Source
 from marl_airhockey.sim.jit.pipeline import Stage
+from marl_airhockey.sim.sensing.images.images import TableImages
 from marl_airhockey.sim.sensing.reaction import Parts, ReactionDelay, whole_steps
 from marl_airhockey.sim.sensing.sensor import Sensor
 from marl_airhockey.sim.world.hidden_pucks import HiddenPucks
 from marl_airhockey.sim.world.observation import NOWHERE, Observation, replaced
 from marl_airhockey.types import ALL, Array, Memory, Rows
 
-PIXELS = 84
 GOALS = ("achieved_goal", "desired_goal")
 
 
@@ -49,8 +47,8 @@ class Observer:
             one is the type of the open seats.
 
     Raises:
-        ValueError: An observation type is unknown, or the reaction time is not a
-            multiple of the control step.
+        ValueError: An observation type is unknown, its images need too much memory, or
+            the reaction time is not a multiple of the control step.
     """
 
     def __init__(
@@ -61,9 +59,6 @@ class Observer:
         forms: Collection[str],
     ) -> None:
         self.scenario, self.sensor, self.forms = scenario, sensor, tuple(forms)
-        for form in forms:
-            if form not in OBSERVE:
-                raise ValueError(unknown_name("observe", form, OBSERVE))
         self.observe = self.forms[0]
         """Observation type of the open seats."""
         self._top_speed = physics.highest("paddle_speed")
@@ -74,12 +69,14 @@ class Observer:
         """Latency of observations by the rules of the game, s."""
         self.direct = self.observe == "velocity" and sensor.ideal and not self._delay
         """True if open seats observe the true state, so that `stage` fills it in."""
+        self.images = TableImages.of(scenario, forms, len(sensor.frames))
+        """Images by observation type."""
         self._layouts: dict[str, ObservationLayout] = {}
         self._fused: dict[str, Fused] = {}
         self.layout_of(self.observe)
 
     def layout_of(self, form: str) -> ObservationLayout:
-        """Return the layout of an observation type ("velocity" for "pixels").
+        """Return the layout of an observation type ("velocity" for images).
 
         Raises:
             ValueError: The worlds were not built for this observation type.
@@ -92,7 +89,7 @@ class Observer:
         if form not in self._layouts:
             scope = ObservationContext(
                 self.scenario.scene,
-                "velocity" if form == "pixels" else form,
+                "velocity" if form in self.images else form,
                 self._top_speed,
                 self.reaction,
             )
@@ -101,8 +98,9 @@ class Observer:
                 p for p in self.scenario.observation if not (apart and p.goal)
             )
             self._layouts[form] = layout = ObservationLayout(observables, scope)
-            show = partial(self._show, layout)
-            self._fused[form] = Fused(show, self.scenario.name)
+            if form not in self.images:
+                show = partial(self._show, layout)
+                self._fused[form] = Fused(show, self.scenario.name)
         return self._layouts[form]
 
     @property
@@ -113,7 +111,7 @@ class Observer:
     @property
     def labels(self) -> tuple[str, ...]:
         """Names of the elements that open seats observe; none for images."""
-        return () if self.observe == "pixels" else self.layout.labels
+        return () if self.observe in self.images else self.layout.labels
 
     def begin(self, worlds: Array, sensed: State, memory: Memory) -> None:
         """Begin an episode in some worlds; compile code that is not compiled yet.
@@ -128,6 +126,8 @@ class Observer:
         for form, fused in self._fused.items():
             if not fused.prepared:
                 fused.prepare(*self._sources(sensed, memory, form))
+        for form, images in self.images.items():
+            images.prepare(*self.pictured(sensed, memory, form))
 
     def note(self, sensed: State, memory: Memory) -> None:
         """Store the sensed state after a step, for later observations."""
@@ -214,8 +214,9 @@ class Observer:
         """
         form = form or self.observe
         self.layout_of(form)
-        if form == "pixels":
-            return self._pictures(memory, seats, worlds)
+        if form in self.images:
+            shown = self.pictured(sensed, memory, form)
+            return self.images[form].read(*shown, seats, worlds)
         fused, sources = self._fused[form], self._sources(sensed, memory, form)
         if seen is not None:
             sources[0].update(replaced(sources[0], seen, worlds))
@@ -241,8 +242,8 @@ class Observer:
         """
         form = form or self.observe
         layout = self.layout_of(form)
-        if form == "pixels":
-            return np.zeros((rows, PIXELS, PIXELS, FRAMES), np.uint8)
+        if form in self.images:
+            return np.zeros((rows, *image_form(form).shape), np.uint8)
         flat, game = np.zeros((rows, len(layout.labels)), np.float32), self.scenario
         if game.goals == "flat" or not isinstance(game, GoalScenario):
             return flat
@@ -289,12 +290,11 @@ class Observer:
                 shown[name] = goal[..., None, :].astype(np.float32)
         return (shown,)
 
-    def _pictures(self, memory: Memory, seats: Array, worlds: Rows) -> Array:
-        from marl_airhockey.sim.sensing.pixels import pictures_of
-
-        frames, goals = self.sensor.frames, memory.get("goal")
-        if self._delay is not None:
-            frames = self._delay.delayed("sensor")["frames"]
-        if goals is not None:
-            goals = goals[worlds]
-        return pictures_of(self.scenario.scene, frames[worlds], goals, seats, PIXELS)
+    def pictured(
+        self, sensed: State, memory: Memory, form: str
+    ) -> tuple[Array, Source, Source]:
+        """Return frames, state and memory, the arguments of `TableImages.collect`."""
+        state, known, _ = self._sources(sensed, memory, form)
+        delay = self._delay
+        frames = delay.delayed("sensor")["frames"] if delay else self.sensor.frames
+        return frames, state, known

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from gymnasium import spaces
 
-from marl_airhockey.sim.contracts.observable import FRAMES
+from marl_airhockey.sim.contracts.image_form import image_form, shows_images
 from marl_airhockey.sim.contracts.scenario import GoalScenario
 from marl_airhockey.sim.world.global_state import GlobalState
-from marl_airhockey.sim.world.observer import PIXELS, Observer
+from marl_airhockey.sim.world.observer import Observer
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ def action_space() -> spaces.Box:
 def observation_space(observer: Observer, observe: str | None = None) -> Any:
     """Return the Box of an observation, or with goals="dict" the Dict."""
     observe = observe or observer.observe
-    if observe == "pixels":
-        return spaces.Box(0, 255, (PIXELS, PIXELS, FRAMES), np.uint8)
+    if shows_images(observe):
+        return spaces.Box(0, 255, image_form(observe).shape, np.uint8)
     layout = observer.layout_of(observe)
     flat = spaces.Box(layout.low, layout.high, dtype=np.float32)
     scenario = observer.scenario

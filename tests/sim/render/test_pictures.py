@@ -4,7 +4,8 @@ import numpy as np
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.sim.render.picture import CIRCLES, SEAT_COLOURS, Frame, draw
+from marl_airhockey.sim.contracts.look import CIRCLES, SEAT_COLOURS
+from marl_airhockey.sim.render.picture import Frame, draw
 
 
 def test_a_picture_shows_the_paddle_where_it_is(scenario):

@@ -1,0 +1,118 @@
+"""Convolutional networks of policies that observe images."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.types import Array
+
+Shape = tuple[int, int, int]
+"""Shape of an observation: height, width, channels."""
+GROUP = 16
+"""Number of channels that share a mean and a variance."""
+
+
+class ResidualBlock(nn.Module):
+    """Two convolutions whose result is added to the input (He et al., 2016)."""
+
+    def __init__(self, channels: int, width: int, stride: int) -> None:
+        super().__init__()
+        self.body = nn.Sequential(
+            *_convolution(channels, width, 3, stride),
+            nn.ReLU(),
+            *_convolution(width, width, 3, 1),
+        )
+        same = channels == width and stride == 1
+        parts = [] if same else _convolution(channels, width, 1, stride)
+        self.shortcut = nn.Sequential(*parts)
+
+    def forward(self, x: Tensor) -> Tensor:
+        added: Tensor = self.body(x) + self.shortcut(x)
+        return added.relu()
+
+
+def small_layers(channels: int) -> nn.Sequential:
+    """Return the layers of Mnih et al. (2015) with half of the channels."""
+    return nn.Sequential(
+        *(nn.Conv2d(channels, 16, 8, 4), nn.ReLU()),
+        *(nn.Conv2d(16, 32, 4, 2), nn.ReLU()),
+        *(nn.Conv2d(32, 32, 3, 1), nn.ReLU(), nn.Flatten()),
+    )
+
+
+def resnet18_layers(channels: int) -> nn.Sequential:
+    """Return a ResNet-18 (He et al., 2016) with group instead of batch normalization.
+
+    A mean and a variance of a batch depend on the policies that filled it, those of a
+    group (Wu and He, 2018) do not.
+    """
+    blocks: list[nn.Module] = []
+    width = 64
+    for k, stage in enumerate((64, 128, 256, 512)):
+        for stride in (2 if k else 1, 1):
+            blocks.append(ResidualBlock(width, stage, stride))
+            width = stage
+    return nn.Sequential(
+        *_convolution(channels, 64, 7, 2),
+        nn.ReLU(),
+        nn.MaxPool2d(3, 2, 1),
+        *blocks,
+        nn.AdaptiveAvgPool2d(1),
+        nn.Flatten(),
+    )
+
+
+NETWORKS: dict[str, Callable[[int], nn.Sequential]] = {
+    "small": small_layers,
+    "resnet18": resnet18_layers,
+}
+"""Functions from the number of channels to convolutional layers, by name."""
+
+
+class ImageActor(nn.Module):
+    """Actor on images (n, H, W, channels), 0 to 255; actions are (n, 2).
+
+    Args:
+        shape: Shape of an observation.
+        network: Name of the convolutional layers, see `NETWORKS`.
+        hidden: Widths of the hidden layers after them.
+
+    Raises:
+        ValueError: The network is unknown.
+    """
+
+    def __init__(self, shape: Shape, network: str, hidden: Sequence[int]) -> None:
+        super().__init__()
+        if network not in NETWORKS:
+            raise ValueError(unknown_name("network", network, list(NETWORKS)))
+        self.shape = shape
+        layers = [*NETWORKS[network](shape[2])]
+        with torch.no_grad():
+            blank = torch.zeros(1, shape[2], *shape[:2])
+            size = nn.Sequential(*layers)(blank).shape[1]
+        for width in hidden:
+            layers += [nn.Linear(size, width), nn.ReLU()]
+            size = width
+        self.layers = nn.Sequential(*layers, nn.Linear(size, 2))
+
+    def forward(self, images: Tensor) -> Tensor:
+        found: Tensor = self.layers(images.permute(0, 3, 1, 2) / 255.0)
+        return found
+
+    def predict(self, observation: Any, deterministic: bool) -> Array:
+        """Return actions (n, 2) for images (n, H, W, channels)."""
+        with torch.inference_mode():
+            rows = torch.from_numpy(np.asarray(observation, np.float32))
+            device = next(self.parameters()).device
+            return np.asarray(self(rows.to(device)).cpu().numpy())
+
+
+def _convolution(channels: int, width: int, size: int, stride: int) -> list[nn.Module]:
+    layer = nn.Conv2d(channels, width, size, stride, size // 2, bias=False)
+    return [layer, nn.GroupNorm(width // GROUP, width)]

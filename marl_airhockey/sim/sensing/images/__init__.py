@@ -1,0 +1,1 @@
+"""Images that seats observe, rendered by compiled code."""
