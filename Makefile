@@ -105,7 +105,7 @@ $(BENCHMARL)/.ready:
 
 $(LEROBOT)/.ready:
 	$(LEROBOT_PYTHON) -m venv $(LEROBOT)
-	$(LEROBOT)/bin/pip install --quiet $(WITH_PYTEST) 'lerobot[core-scripts,training]==0.6.1' \
+	$(LEROBOT)/bin/pip install --quiet $(WITH_PYTEST) 'lerobot[core-scripts,training,diffusion]==0.6.1' \
 		-e '.[play,data,hardware]' -e plugins/lerobot_env_airhockey -e plugins/lerobot_robot_airhockey
 	touch $@
 

@@ -89,7 +89,7 @@ def bench_environments(
         title=f"{rounds} rounds of {seconds} CPU-s, {rates[0].threads} threads"
     )
     for name in ("scenario", "backend", "observe", ""):
-        table.add_column(name)
+        table.add_column(name, overflow="fold")
     for name in ("env-steps per CPU-s", "agent-steps per CPU-s", "per s", "spread"):
         table.add_column(name, justify="right")
     for rate in rates:

@@ -42,8 +42,8 @@ SUFFIX = "_full_size"
 Observe = Annotated[
     str | None,
     typer.Option(
-        help="Observation type: velocity, estimate or history; by default the type "
-        "with which the policy was trained."
+        help="Observation type: velocity, estimate, history or pixels; by default the "
+        "type with which the policy was trained."
     ),
 ]
 ControlDt = Annotated[

@@ -26,6 +26,7 @@ from marl_airhockey.registry import (
     zoo_names,
 )
 from marl_airhockey.rollouts.as_trained import as_trained
+from marl_airhockey.sim.contracts.image_form import IMAGES
 from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.sim.jit import shipped
 from marl_airhockey.sim.jit.cache import used
@@ -83,7 +84,7 @@ def precompile(
         with _variables({shipped.VARIABLE: "0"}):
             _compile_all(work, jobs)
         return
-    work += [] if scenarios else list(_drivers())
+    work += [] if scenarios else [*_images(), *_drivers()]
     given = {"NUMBA_CPU_NAME": target, "NUMBA_CPU_FEATURES": ""}
     with _variables({shipped.VARIABLE: "0", **given}):
         paths = _compile_all(work, jobs)
@@ -93,6 +94,12 @@ def precompile(
     for path in paths:
         shutil.copy(path, out)
     shipped.write_manifest(out, target)
+
+
+def _images() -> Iterator[tuple[str, Keywords]]:
+    """Yield each scenario with keywords for images."""
+    for name in scenario_names():
+        yield name, Keywords(observe=IMAGES)
 
 
 def _drivers() -> Iterator[tuple[str, Keywords]]:

@@ -82,7 +82,7 @@ def run(
     if as_json:
         data = {
             "results": [
-                {**result.to_json(), "solved": play.solved.tolist()}
+                {**asdict(result), "solved": play.solved.tolist()}
                 for result, play in zip(results, plays, strict=True)
             ],
             "differences": {name: asdict(pair) for name, pair in pairs.items()},

@@ -14,6 +14,7 @@ from marl_airhockey.registry import make_scenario, scenario_names
 from marl_airhockey.rollouts.columns import SHARED
 from marl_airhockey.rollouts.replay import Replay
 from marl_airhockey.rollouts.rollout import AT_ONCE
+from marl_airhockey.sim.contracts.image_form import shows_images
 from marl_airhockey.sim.core.recording import PLAYED, Episode, Recording
 
 LEFT_OUT = ("columns", "format", "observation_labels", *SHARED)
@@ -49,7 +50,8 @@ def relabelled(
     game = make_scenario(scenario, **new["options"])
     with whole_recording(out, new) as writer:
         for batch in batches(episodes_of(path)):
-            for episode in Replay(Recording(path, head, batch), game).episodes():
+            recording = Recording(path, head, batch)
+            for episode in Replay(recording, game, new["observe"]).episodes():
                 writer.write(_cut(episode))
     return out
 
@@ -69,8 +71,11 @@ def new_head(
     """
     chosen = {**_table_of(head), **options}
     game = make_scenario(scenario, **chosen)
+    observe = head.get("observe", "velocity")
     return {
         **{k: v for k, v in head.items() if k not in LEFT_OUT},
+        # Images are not stored.
+        "observe": "velocity" if shows_images(observe) else observe,
         "scenario": game.name,
         "options": chosen,
         "max_cycles": round(game.seconds / float(head["control_dt"])),

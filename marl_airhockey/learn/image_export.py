@@ -18,7 +18,8 @@ def save_image_policy(
     """Write a policy that observes images as an ONNX model.
 
     Args:
-        layers: Layers from images (n, channels, H, W), 0 to 1, to actions (n, 2).
+        layers: Layers from inputs (n, channels, H, W), see `image_networks.darkness`,
+            to actions (n, 2).
         shape: Shape of an observation.
         card: Card of the policy.
         path: Path of the file.
@@ -26,6 +27,7 @@ def save_image_policy(
     graph = Graph()
     x = graph.node("Transpose", "observation", perm=[0, 3, 1, 2])
     x = graph.node("Div", x, graph.constant("white", 255.0))
+    x = graph.node("Sub", graph.constant("one", 1.0), x)
     graph.save(_add(graph, layers, x, "layers"), shape, card, path)
 
 

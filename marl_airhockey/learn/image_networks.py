@@ -37,6 +37,15 @@ class ResidualBlock(nn.Module):
         return added.relu()
 
 
+def darkness(images: Tensor) -> Tensor:
+    """Return the input of a network for images from 0, black, to 1, white.
+
+    The table is nearly white. Inputs near 0 for everything but bodies and marks are
+    learned many times faster.
+    """
+    return 1.0 - images
+
+
 def small_layers(channels: int) -> nn.Sequential:
     """Return the layers of Mnih et al. (2015) with half of the channels."""
     return nn.Sequential(
@@ -102,7 +111,7 @@ class ImageActor(nn.Module):
         self.layers = nn.Sequential(*layers, nn.Linear(size, 2))
 
     def forward(self, images: Tensor) -> Tensor:
-        found: Tensor = self.layers(images.permute(0, 3, 1, 2) / 255.0)
+        found: Tensor = self.layers(darkness(images.permute(0, 3, 1, 2) / 255.0))
         return found
 
     def predict(self, observation: Any, deterministic: bool) -> Array:

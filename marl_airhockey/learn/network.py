@@ -11,7 +11,7 @@ import torch
 from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
-from marl_airhockey.learn.image_networks import small_layers
+from marl_airhockey.learn.image_networks import darkness, small_layers
 
 
 class FixedScale(BaseFeaturesExtractor):
@@ -63,5 +63,5 @@ class ImageFeatures(BaseFeaturesExtractor):
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         """Return the features (B, size) of images (B, channels, H, W), 0 to 1."""
-        found: torch.Tensor = self.layers(observations)
+        found: torch.Tensor = self.layers(darkness(observations))
         return found

@@ -74,6 +74,12 @@ class PPOConfig(SelfPlayConfig):
                 f"engine: {self.engine} learns from flat observations; use sb3 for "
                 'observe="pixels" and goals="dict"'
             )
+        if self.self_play and shows_images(self.observe):
+            raise ValueError(
+                f"observe: self-play does not learn from images ({self.observe}); "
+                "choose the drivers of the other seats, as in drivers={'paddle_1': "
+                "'striker'}, or another observation type"
+            )
         if not 0 <= self.curriculum <= 1:
             raise ValueError(f"curriculum: {self.curriculum} must be in 0 .. 1")
         if self.curriculum and (self.engine != "torch" or self.self_play):

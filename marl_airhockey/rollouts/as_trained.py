@@ -11,6 +11,7 @@ from marl_airhockey.policies.policy import Policy
 from marl_airhockey.policies.trust import is_trusted_code, require_trust
 from marl_airhockey.registry import find_scenario, make_driver, runs_code
 from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.image_form import image_form, shows_images
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.world.keywords import Keywords
 
@@ -68,9 +69,20 @@ def as_trained(
 
 
 def seen_in(player: Driver, keywords: Keywords) -> Driver:
-    """Return a policy with the observation type of the keywords, if they have one."""
+    """Return a policy with the observation type of the keywords, if they have one.
+
+    Raises:
+        ValueError: One of the types is another kind of images.
+    """
     observe = keywords.get("observe")
     if observe and isinstance(player, Policy):
+        own = player.observe or observe
+        forms = [image_form(f) if shows_images(f) else None for f in (own, observe)]
+        if forms[0] != forms[1]:
+            raise ValueError(
+                f"{player.source}: it was trained with observe={own!r}, not with "
+                f"{observe!r}; omit observe"
+            )
         return replace(player, observe=observe)
     return player
 

@@ -143,7 +143,7 @@ def _memories(world: World) -> Columns:
 
 
 def _observations(world: World) -> Columns:
-    if world.observer.images:
+    if world.observer.observe in world.observer.images:
         return {}
     shown = world.observe(np.arange(len(world.scene.seats)))
     if isinstance(shown, Mapping):

@@ -242,7 +242,7 @@ def players(suite: str) -> tuple[str, ...]:
 FIELDS = (
     *("suite", "driver", "pieces", "success"),
     *(f"class_{k + 1}" for k in range(CLASSES)),
-    *("touched", "first_touch", "violations"),
+    *("touched", "first_touch", "violations", "acceleration"),
 )
 BOOK = Book(
     DATA / "suites.csv",
@@ -257,7 +257,7 @@ def measure(name: str, player: str) -> Row:
     driver = Solution(suite.name) if player == "solution" else make_driver(player)
     found = suite.summarize(player, suite.play(driver))
     shares = found.success, *(share or 0.0 for share in found.by_class)
-    more = found.touched, found.first_touch, found.violations
+    more = found.touched, found.first_touch, found.violations, found.acceleration
     numbers = (round(x, 4) for x in (*shares, *more))
     values = name, player, len(suite), *numbers
     return dict(zip(FIELDS, values, strict=True))

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import marl_airhockey as ah
 from marl_airhockey.cli.main import app
 from marl_airhockey.data.exchange.formats import FORMATS, find_format, import_dataset
-from marl_airhockey.data.exchange.lerobot import export_lerobot
+from marl_airhockey.data.exchange.lerobot import export_lerobot, table_image
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.exchange.trajectories import (
     FIELDS,
@@ -23,6 +24,7 @@ from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.relabel import relabelled
 from marl_airhockey.registry import make_driver, make_scenario
 from marl_airhockey.sim.core.recording import FILM
+from marl_airhockey.sim.render.renderer import Renderer
 
 pd = pytest.importorskip("pandas")
 pq = pytest.importorskip("pyarrow.parquet")
@@ -149,6 +151,30 @@ def test_lerobot_video_shows_the_newest_picture_of_each_step(tmp_path):
     assert np.abs(np.array(levels) - wanted).max() < 10, "the nearest level"
     stats = json.loads((folder / "meta/stats.json").read_text())[name]
     assert np.array(stats["mean"]).shape == (3, 1, 1)
+
+
+def test_lerobot_images_show_the_table_before_each_step(tmp_path):
+    path = recorded(tmp_path, episodes=2)
+    folder = export_lerobot([path], "reach", tmp_path / "sets", images=True)
+    info = json.loads((folder / "meta/info.json").read_text())
+    name = "observation.images.table"
+    height, width, _ = info["features"][name]["shape"]
+    assert width == 224
+    assert "observation.environment_state" not in info["features"]
+    file = info["video_path"].format(video_key=name, chunk_index=0, file_index=1)
+    video, shown = cv2.VideoCapture(str(folder / file)), []
+    while (read := video.read())[0]:
+        shown.append(read[1][..., ::-1])
+    (_, episode) = read_recording(path).episodes
+    assert len(shown) == len(episode)
+    env = ah.gym_env("reach", "rgb_array")
+    env.reset(seed=1)
+    renderer = Renderer(env.world, "rgb_array", "")
+    for image, action in zip(shown, episode.columns["action"][:, 0], strict=True):
+        expected = table_image(renderer)
+        assert expected.shape == (height, width, 3)
+        assert np.abs(image.astype(int) - expected).mean() < 3.0
+        env.step(action)
 
 
 def grey_film(path, count):

@@ -288,6 +288,14 @@ def test_speed_of_images_is_that_of_its_rows():
     assert f"{min(spreads):.0f} to {max(spreads):.0f} % of the median" in text
 
 
+def test_results_of_image_policies_are_those_of_their_rows():
+    lines = script("reproduce/image_policies.py")["summary"](
+        rows_of("image_policies.csv")
+    )
+    shown = table("docs/image_observations.md", "method", "reach")
+    assert [list(line.values()) for line in shown] == lines
+
+
 def test_success_by_latency_is_that_of_its_rows():
     found = script("reproduce/delay.py")
     groups = found["groups"](rows_of("delay.csv"))

@@ -11,12 +11,15 @@ import torch
 import marl_airhockey as ah
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
+from marl_airhockey.data.relabel import relabelled
 from marl_airhockey.learn.image_export import save_image_policy
 from marl_airhockey.learn.image_networks import NETWORKS, ImageActor
 from marl_airhockey.learn.offline.config import offline_config
 from marl_airhockey.learn.offline.pixels import recorded_steps, shifted
 from marl_airhockey.learn.train import run_training
+from marl_airhockey.policies.policy import Policy
 from marl_airhockey.registry import make_driver
+from marl_airhockey.rollouts.replay import Replay
 
 SMALL = {
     **{"observe": "pixels", "total_steps": 200, "batch_size": 16, "hidden": [16]},
@@ -130,3 +133,49 @@ def test_shifted_images_are_crops_of_images_with_repeated_edges():
     crops = [padded[y : y + 5, x : x + 5] for y in range(5) for x in range(5)]
     seen = {crop.tobytes() for crop in found}
     assert seen == {crop.tobytes() for crop in crops}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"shift": -1}, r"shift: -1 must be in 0 \.\. 16"),
+        ({"observe": "velocity", "network": "resnet18"}, "they belong to images"),
+        ({"observe": "velocity", "shift": 2}, "they belong to images"),
+    ],
+)
+def test_settings_that_do_not_fit_are_named(expert, changes, message):
+    with pytest.raises(ValueError, match=message):
+        offline_config("bc", [expert], {**SMALL, **changes})
+
+
+def image_policy():
+    def predict(images, deterministic):
+        return np.zeros((len(images), 2))
+
+    return Policy(predict, (36, 36, 3), "pixels:size=36", "mine")
+
+
+def test_a_recording_of_an_image_policy_has_the_usual_observations(tmp_path):
+    path = record_episodes(image_policy(), "mine", "touch", 2, tmp_path / "a", 0, {})
+    recording = read_recording(path)
+    assert recording.head["observe"] == "velocity"
+    replayed = Replay(recording).episodes(["observation"])
+    for episode, again in zip(recording.episodes, replayed, strict=True):
+        found, expected = (e.columns["observation"] for e in (episode, again))
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_a_relabelled_recording_of_images_has_observations(tmp_path):
+    keywords = {"observe": "pixels:size=36"}
+    player = make_driver("still")
+    path = record_episodes(player, "still", "touch", 1, tmp_path / "a", 0, keywords)
+    assert "observation" not in read_recording(path).episodes[0].columns
+    relabelled(path, "touch", tmp_path / "b", {})
+    (episode,) = read_recording(tmp_path / "b").episodes
+    assert episode.columns["observation"].shape[-1] > 4
+
+
+def test_another_observation_type_than_in_training_is_named():
+    for player, observe in (("zoo/touch", "pixels"), (image_policy(), "velocity")):
+        with pytest.raises(ValueError, match=r"trained with observe=.*; omit observe"):
+            ah.evaluate(player, "touch", episodes=1, observe=observe)

@@ -157,6 +157,13 @@ def test_pixels_and_goals_are_learned_by_sb3(changes):
         preset("reach", {**given, "options": options, "engine": "torch"})
 
 
+def test_self_play_from_images_is_named():
+    with pytest.raises(ValueError, match="self-play does not learn from images"):
+        preset("duel", {"observe": "pixels"})
+    fixed = {"observe": "pixels", "drivers": {"paddle_1": "striker"}}
+    assert preset("duel", fixed).engine == "sb3"
+
+
 def test_ppo_from_images_leaves_a_policy_that_needs_no_trust(tmp_path):
     observe = "pixels:size=36,frames=2"
     tiny = {"total_steps": 256, "num_worlds": 4, "n_steps": 32, "batch_size": 64}

@@ -182,14 +182,28 @@ def export(
             "else datasets.",
         ),
     ] = None,
+    images: Annotated[
+        bool,
+        typer.Option(
+            "--images",
+            help="Render an image of the table for each step, and leave out the true "
+            "state; for lerobot.",
+        ),
+    ] = False,
 ) -> None:
     """Export recordings as a dataset that can be loaded without this library."""
     from marl_airhockey.data.exchange.formats import find_format
+    from marl_airhockey.data.exchange.lerobot import export_lerobot
     from marl_airhockey.data.files import size_of, whole_recordings_in
 
     files = whole_recordings_in(paths)
     chosen = None if seat < 0 else seat
-    folder = find_format(to).export(files, name, out, chosen)
+    if images and to != "lerobot":
+        raise ValueError(f"--images: {to} has no images; use --to lerobot")
+    if images:
+        folder = export_lerobot(files, name, out, chosen, images=True)
+    else:
+        folder = find_format(to).export(files, name, out, chosen)
     console.print(f"wrote {folder} ({size_of(folder) / 1e6:.1f} MB)", soft_wrap=True)
 
 

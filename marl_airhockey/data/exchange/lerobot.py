@@ -2,8 +2,8 @@
 
 A frame contains the values before a step, the action, and its result (`next.*`). The
 observation after the last step of an episode is a column of the table of episodes,
-`final/NAME`, which LeRobot ignores. The video of a real table has one image per step:
-the newest camera frame at the start of the step.
+`final/NAME`, which LeRobot ignores. The video has one image per step: the newest frame
+of a real table's camera at the start of the step, or an image of the table from above.
 
 LeRobot computes its `timestamp` from the rate. The times that were measured on a real
 table are further features, `TIMES`.
@@ -12,8 +12,9 @@ table are further features, `TIMES`.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,16 +33,23 @@ from marl_airhockey.data.exchange.seats import (
     playable,
 )
 from marl_airhockey.data.files import named_folder, shared_head, whole_folder
-from marl_airhockey.data.film import count_frames, film_gap
+from marl_airhockey.data.film import FilmFrames, count_frames, film_gap
 from marl_airhockey.make import parallel_env
+from marl_airhockey.rollouts.replay import Replay
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.core.geometry import products
-from marl_airhockey.sim.core.recording import FILM, Columns, Episode
+from marl_airhockey.sim.core.recording import FILM, Columns, Episode, Recording
+from marl_airhockey.sim.render.picture import draw
+from marl_airhockey.sim.render.renderer import Renderer
 from marl_airhockey.types import Array
 
+WIDTH = 224
+"""Width of a rendered image, pixels."""
 STATE = ("position", "velocity", "angle", "spin")
 """Fields of the true state that form `observation.environment_state`."""
 OBSERVATION, ACTION = "observation.state", "action"
+TRUE_STATE = "observation.environment_state"
+"""Feature of the true state."""
 SENT, APPLIED = "sent_action", "applied_action"
 """Features with the command after all limits, and the resulting motion of the paddle,
 both as actions."""
@@ -58,7 +66,11 @@ action, s."""
 
 
 def export_lerobot(
-    files: Sequence[Path], name: str, root: Path | None = None, seat: int | None = 0
+    files: Sequence[Path],
+    name: str,
+    root: Path | None = None,
+    seat: int | None = 0,
+    images: bool = False,
 ) -> Path:
     """Write recordings as a LeRobot dataset; return its folder.
 
@@ -67,6 +79,8 @@ def export_lerobot(
         name: Name of the dataset.
         root: Folder of all datasets; None for ``datasets``.
         seat: Index of the seat whose steps are written.
+        images: True to render a video, if there is none of a camera, and to leave out
+            the true state.
 
     Raises:
         ValueError: The dataset exists, no seat is given, the rate is not a whole
@@ -95,7 +109,13 @@ def export_lerobot(
                 warnings.warn(f"{gap}; left out", RuntimeWarning, stacklevel=2)
                 continue
             frames, last = _frames(path, episode, form)
-            writer.add(frames, last, _task(head), *_film(path, episode))
+            if images:  # A policy that sees images must not see the true state.
+                frames.pop(TRUE_STATE, None)
+            if path in films:
+                shown = _filmed(films[path], episode)
+            else:
+                shown = _rendered(path, episode, head) if images else iter(())
+            writer.add(frames, last, _task(head), shown)
         if not writer.episodes:
             raise ValueError(f"{files[0]}: the video ends before every episode")
         ours = {**playable(head), "scenario": head["scenario"], "seat": seat}
@@ -159,7 +179,7 @@ def _state(episode: Episode) -> Columns:
     if not states:
         return {}
     flat = [values.reshape(len(values), -1) for values in states]
-    return {"observation.environment_state": np.concatenate(flat, 1, dtype=np.float32)}
+    return {TRUE_STATE: np.concatenate(flat, 1, dtype=np.float32)}
 
 
 def _motion(episode: Episode, form: _Form) -> Columns:
@@ -191,9 +211,25 @@ def _times(episode: Episode) -> Columns:
     return {name: values for name, values in times.items() if np.isfinite(values).all()}
 
 
-def _film(path: Path, episode: Episode) -> tuple[Path, Array] | tuple[()]:
-    """Return the video of an episode and the number of its frame for each step (T,)."""
-    if "frame" not in episode.columns or not (path / FILM).exists():
-        return ()
-    shown = np.concatenate([episode.first["frame"][None], episode.columns["frame"]])
-    return path / FILM, np.maximum(shown[:-1], 0)
+def _filmed(film: Path, episode: Episode) -> Iterator[Array]:
+    """Yield the newest frame of a camera before each step, RGB."""
+    if "frame" in episode.columns:
+        shown = [episode.first["frame"][None], episode.columns["frame"]]
+        frames = FilmFrames(film)
+        for number in np.maximum(np.concatenate(shown)[:-1], 0):
+            yield frames.picture(int(number))[..., ::-1]
+
+
+def _rendered(path: Path, episode: Episode, head: dict[str, Any]) -> Iterator[Array]:
+    """Yield an image of the table before each step, RGB."""
+    replay = Replay(Recording(path, head, [episode]))
+    renderer = Renderer(replay.world, "rgb_array", "")
+    replay.begin()
+    for t in range(len(episode)):
+        yield table_image(renderer)
+        replay.step(t)
+
+
+def table_image(renderer: Renderer, width: int = WIDTH) -> Array:
+    """Return an image (H, W, 3) uint8 RGB of the table, without texts and trails."""
+    return draw(replace(renderer.frame(), trails=()), width, bar=0)

@@ -7,12 +7,12 @@ a row group for each episode, tables of episodes and tasks, statistics, and vide
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from marl_airhockey.data.film import FilmFrames
 from marl_airhockey.sim.core.recording import Columns
 from marl_airhockey.sim.render.mp4 import Mp4Writer
 from marl_airhockey.types import Array
@@ -53,7 +53,6 @@ class LeRobotWriter:
         self._values: list[Columns] = []
         self._frames = self._file = 0
         self._table: Any = None
-        self._film: FilmFrames | None = None
 
     @property
     def episodes(self) -> int:
@@ -65,8 +64,7 @@ class LeRobotWriter:
         frames: Columns,
         last: Columns,
         task: str,
-        film: Path | None = None,
-        pictures: Array | None = None,
+        images: Iterable[Array] = (),
     ) -> None:
         """Add an episode.
 
@@ -74,8 +72,7 @@ class LeRobotWriter:
             frames: Features (T, ...) by name.
             last: Observations after the last step, by name.
             task: Description of the task.
-            film: Video of the recording; None for no video.
-            pictures: Number of the frame of the video for each step (T,).
+            images: Image (H, W, 3) uint8 RGB before each step; none for no video.
         """
         count, number = len(next(iter(frames.values()))), len(self._rows)
         if task not in self._tasks:
@@ -102,8 +99,8 @@ class LeRobotWriter:
             "meta/episodes/file_index": 0,
             **{f"{FINAL}{name}": value.tolist() for name, value in last.items()},
         }
-        if film is not None and pictures is not None:
-            stats[CAMERA] = self._add_video(number, film, pictures)
+        if video := self._add_video(number, count, images):
+            stats[CAMERA] = video
             row |= {
                 f"videos/{CAMERA}/chunk_index": number // FILES,
                 f"videos/{CAMERA}/file_index": number % FILES,
@@ -152,26 +149,28 @@ class LeRobotWriter:
         path.parent.mkdir(parents=True, exist_ok=True)
         return path
 
-    def _add_video(self, number: int, film: Path, pictures: Array) -> Stats:
-        """Write the video of an episode; return the statistics of its images."""
-        if self._film is None or self._film.path != film:
-            self._film = FilmFrames(film)
-        path = self._path(f"videos/{CAMERA}", number, "mp4")
-        writer = Mp4Writer(path, self._rate)
-        kept, every = [], max(len(pictures) // SAMPLED, 1)
-        for k, picture in enumerate(pictures):
-            image = self._film.picture(int(picture))
-            if not k:
+    def _add_video(self, number: int, count: int, images: Iterable[Array]) -> Stats:
+        """Write the video of an episode; return the statistics of its images.
+
+        The result is empty if there are no images.
+        """
+        writer, some = None, list[Array]()
+        for k, image in enumerate(images):
+            if writer is None:
                 height, width = (2 * (size // 2) for size in image.shape[:2])
                 self._features[CAMERA] = _video(height, width, self._rate)
-            writer.append(image[..., ::-1])
-            if k % every == 0:
-                kept.append(image[::4, ::4, ::-1].reshape(-1, 3) / 255.0)
+                path = self._path(f"videos/{CAMERA}", number, "mp4")
+                writer = Mp4Writer(path, self._rate)
+            writer.append(image)
+            if k % max(count // SAMPLED, 1) == 0:
+                some.append(image[::4, ::4].reshape(-1, 3) / 255.0)
+        if writer is None:
+            return {}
         writer.close()
-        found = _stats(np.concatenate(kept))
+        found = _stats(np.concatenate(some))
         # Statistics of images have the channels first and one value for all pixels.
         lists = {n: [[[x]] for x in v] for n, v in found.items() if n != "count"}
-        return {**lists, "count": [len(pictures)]}
+        return {**lists, "count": [count]}
 
     def close(self, ours: dict[str, Any]) -> None:
         """Write tables of episodes and tasks, statistics and `info.json`.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack
@@ -31,12 +31,14 @@ from marl_airhockey.rollouts.as_trained import as_trained, seen_in
 from marl_airhockey.rollouts.rollout import play_episodes
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.geometry import length
+from marl_airhockey.sim.core.recording import Episode
 from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
 
 AT_ONCE = 64
 """Largest number of pieces in one batch of a backend that is not compiled."""
-COLUMNS = ("success", "violation", "state.touched")
+COLUMNS = ("success", "violation", "state.touched", "state.velocity")
 
 
 class Piece(NamedTuple):
@@ -62,6 +64,9 @@ class SuitePlay:
     """Time of the first touch by ``paddle_0`` (N,), s; nan without one."""
     violations: Array
     """Share of the control steps in which the action exceeded a limit (N,)."""
+    acceleration: Array
+    """Largest change of the paddle's velocity in a control step, divided by its length,
+    (N,), m/s^2."""
     settings: dict[str, Any]
     """Keywords of the environment and options of the scenario that were given."""
 
@@ -85,12 +90,10 @@ class SuiteResult:
     """Mean time of the first touch, s."""
     violations: float
     """Share of the control steps in which the action exceeded a limit."""
+    acceleration: float
+    """Mean of the largest acceleration of the paddle in each piece, m/s^2."""
     settings: dict[str, Any]
     """Keywords of the environment and options of the scenario that were given."""
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the fields as a JSON object."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -196,6 +199,7 @@ class Suite:
             np.array([e.columns["success"][-1, 0] > 0 for e in episodes]),
             np.array([t.argmax() * dt if t.any() else np.nan for t in touched]),
             np.array([(e.columns["violation"][:, 0, -1] > 0).mean() for e in episodes]),
+            np.array([_peak(e) / dt for e in episodes]),
             {**keywords, **({"options": self.options} if self.options else {})},
         )
 
@@ -251,8 +255,16 @@ class Suite:
             if touched.any()
             else 0.0,
             violations=float(played.violations.mean()),
+            acceleration=float(played.acceleration.mean()),
             settings=dict(played.settings),
         )
+
+
+def _peak(episode: Episode) -> float:
+    """Return the largest change of the velocity of ``paddle_0`` in a step, m/s."""
+    first, later = (c["state.velocity"] for c in (episode.first, episode.columns))
+    velocity = np.concatenate([first[None], later])[:, 0]
+    return float(length(np.diff(velocity, axis=0)).max())
 
 
 def _check(driver: Driver, backend: str, keywords: Keywords) -> None:

@@ -23,6 +23,8 @@ STEPS = {"bc": 20_000, "iql": 40_000, "td3_bc": 40_000, "rebrac": 40_000}
 """Default number of gradient steps of each algorithm."""
 PIXEL_STEPS = 8_000
 """Default number of gradient steps of cloning from pixels."""
+MOST_SHIFT = 16
+"""Largest allowed shift of images, pixels."""
 ALGORITHMS = tuple(STEPS)
 """Names of the algorithms, which are also the names of their files."""
 
@@ -63,7 +65,7 @@ class OfflineConfig(RunConfig):
     """Convolutional layers before ``hidden``, if images are observed: "small" or
     "resnet18", see `image_networks.NETWORKS`."""
     shift: int = 0
-    """Largest random shift of images in training, pixels, 0 or more."""
+    """Largest random shift of images in training, pixels, 0 to `MOST_SHIFT`."""
     evaluations: int = 5
     """Number of evaluations during training, above 0."""
     eval_episodes: int = 200
@@ -103,6 +105,12 @@ class OfflineConfig(RunConfig):
         super().__post_init__()
         if self.algo not in ALGORITHMS:
             raise ValueError(unknown_name("algo", self.algo, ALGORITHMS))
+        if not 0 <= self.shift <= MOST_SHIFT:
+            raise ValueError(f"shift: {self.shift} must be in 0 .. {MOST_SHIFT}")
+        if not shows_images(self.observe) and (self.network != "small" or self.shift):
+            raise ValueError(
+                "network, shift: they belong to images; set observe=pixels, too"
+            )
         if not self.data:
             raise ValueError(f"data: {self.algo} needs at least one recording")
         for name in ("share", "expectile", "tau"):

@@ -9,11 +9,11 @@ from functools import cache
 from marl_airhockey.sim.contracts.observable import OBSERVE
 from marl_airhockey.sim.core.errors import unknown_name
 
-NAME = "pixels"
+IMAGES = "pixels"
 """Observation type of images with the default settings."""
 CHANNELS = {"grey": 1, "rgb": 3}
 """Number of channels of a frame by colour."""
-SIZES, STACKS = range(32, 257), range(1, 9)
+SIZES, STACKS = range(36, 257), range(1, 9)
 """Allowed sizes and numbers of frames."""
 
 
@@ -55,7 +55,7 @@ class ImageForm:
 
 def shows_images(observe: str | None) -> bool:
     """Return True if an observation type consists of images."""
-    return observe is not None and observe.partition(":")[0] == NAME
+    return observe is not None and observe.partition(":")[0] == IMAGES
 
 
 def check_forms(forms: Iterable[str]) -> None:
@@ -80,14 +80,19 @@ def image_form(observe: str) -> ImageForm:
     known = {f.name: str(f.type) for f in fields(ImageForm)}
     found: dict[str, int | str] = {}
     for part in tail.split(",") if colon else ():
-        name, _, value = part.partition("=")
+        name, _, value = (text.strip() for text in part.partition("="))
         if name not in known:
             raise ValueError(
                 f"observe: {observe!r}: {unknown_name('setting', name, list(known))}"
             )
-        if known[name] == "int" and not value.isdigit():
-            raise ValueError(f"observe: {observe!r}: {name} must be a whole number")
-        found[name] = int(value) if known[name] == "int" else value
+        if name in found:
+            raise ValueError(f"observe: {observe!r}: {name} is given twice")
+        try:
+            found[name] = int(value) if known[name] == "int" else value
+        except ValueError:
+            raise ValueError(
+                f"observe: {observe!r}: {name} must be a whole number"
+            ) from None
     try:
         return ImageForm(**found)  # type: ignore[arg-type]
     except ValueError as error:

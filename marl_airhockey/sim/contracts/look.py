@@ -128,7 +128,8 @@ def table_shapes(scene: Scene, viewer: int = 0) -> Iterator[Shape]:
         workspace = products(np.asarray(seat.reach), table.rotation(seat.side).T)
         yield Shape(workspace, pale(seat_colour(scene, i, viewer), 0.86), line=1)
     for owner, gap in _gaps(scene):
-        yield Shape(gap, seat_colour(scene, owner, viewer))
+        own = sides[owner] == sides[viewer]
+        yield Shape(gap, seat_colour(scene, viewer if own else owner, viewer))
     for obstacle in table.obstacles:
         start, radius = np.asarray(obstacle.start), obstacle.radius
         end = np.asarray(obstacle.end or obstacle.start)

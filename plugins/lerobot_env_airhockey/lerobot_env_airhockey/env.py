@@ -5,7 +5,6 @@ LeRobot calls `make_env`. In a repository of the Hub, this file is `env.py`.
 
 from __future__ import annotations
 
-import dataclasses
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -17,7 +16,7 @@ from gymnasium.spaces import Box, Dict
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
 
 import marl_airhockey as ah
-from marl_airhockey.data.exchange.lerobot import STATE
+from marl_airhockey.data.exchange.lerobot import STATE, WIDTH, table_image
 from marl_airhockey.envs.describe import what
 from marl_airhockey.hardware.calibration.lab_rig import opened_rig
 from marl_airhockey.hardware.rig import Rig
@@ -29,8 +28,6 @@ TASK = "juggle"
 """Default task."""
 CAMERA = "table"
 """Name of the camera, as in datasets that this library exports."""
-WIDTH = 224
-"""Default width of an image, pixels."""
 OBSERVATIONS = {
     "pixels_agent_pos": ("pixels", "agent_pos"),
     "environment_state_agent_pos": ("environment_state", "agent_pos"),
@@ -99,8 +96,7 @@ class LeRobotTask(gymnasium.Env):
         world = self._env.world
         if world.live:
             return world.backend.photograph(0, "camera", (), self._width)
-        frame = dataclasses.replace(self._renderer.frame(), trails=())
-        return draw(frame, self._width, bar=0)
+        return table_image(self._renderer, self._width)
 
     def _seen(self, observation: Any) -> dict[str, Any]:
         shown: dict[str, Any] = {"agent_pos": observation}

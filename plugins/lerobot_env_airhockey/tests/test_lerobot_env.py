@@ -125,10 +125,26 @@ lerobot-eval --policy.path=act/checkpoints/last/pretrained_model --policy.device
     --output_dir=eval
 """
 """Commands of a user, one for each unindented line."""
+IMAGE_COMMANDS = """
+airhockey data record zoo/reach --episodes 4 --out rec
+airhockey data export rec --to lerobot --images --name reach --out sets
+lerobot-train --dataset.repo_id=reach --dataset.root=sets/reach
+    --dataset.video_backend=pyav --policy.type=diffusion --policy.push_to_hub=false
+    --policy.device=cpu --policy.pretrained_backbone_weights=null
+    --policy.use_group_norm=true --policy.down_dims=[32,64]
+    --policy.num_inference_steps=2
+    --steps=4 --save_freq=4 --batch_size=4 --num_workers=0 --output_dir=act
+    --wandb.enable=false
+lerobot-eval --policy.path=act/checkpoints/last/pretrained_model --policy.device=cpu
+    --env.type=airhockey --env.task=reach --eval.n_episodes=4 --eval.batch_size=4
+    --eval.use_async_envs=false --output_dir=eval
+"""
+"""The same commands with images."""
 
 
-def test_act_learns_from_an_exported_dataset_and_is_evaluated(tmp_path):
-    for line in COMMANDS.strip().replace("\n    ", " ").splitlines():
+@pytest.mark.parametrize("commands", [COMMANDS, IMAGE_COMMANDS], ids=["act", "images"])
+def test_policies_learn_from_an_exported_dataset_and_are_evaluated(commands, tmp_path):
+    for line in commands.strip().replace("\n    ", " ").splitlines():
         command, *words = line.split()
         done = subprocess.run(
             [str(BIN / command), *words], cwd=tmp_path, capture_output=True, text=True

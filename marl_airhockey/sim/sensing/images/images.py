@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ from marl_airhockey.sim.jit.threads import over_rows
 from marl_airhockey.sim.sensing.images.drawing import render
 from marl_airhockey.sim.sensing.images.raster import CORNERS
 from marl_airhockey.sim.sensing.images.templates import (
+    USUAL_WIDTH,
     Outlines,
     Templates,
     outlines,
@@ -40,6 +42,9 @@ from marl_airhockey.types import ALL, Array, Rows
 
 LEAST = 64
 """Smallest number of worlds whose images are worth a thread."""
+THINNEST = 1.0
+"""Smallest width of a line of a mark, pixels, so that marks are visible in small
+images."""
 COPIES = 3
 """Number of batches of images in memory: before and after a step, and those of a
 learner."""
@@ -93,6 +98,10 @@ class TableImages:
         """
         check_forms(forms)
         shown = {form: image_form(form) for form in forms if shows_images(form)}
+        if shown and scenario.goals == "dict":
+            raise ValueError(
+                f"observe: {', '.join(shown)}: images show the goal; omit goals='dict'"
+            )
         return {k: TableImages(scenario, f, num_worlds) for k, f in shown.items()}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -104,16 +113,15 @@ class TableImages:
             return
         frames = self._newest(frames)
         shapes, squares, top = self._shapes_of(frames, State(**state), dict(memory))
-        every, depth = 0, self.form.channels
-        last = self.form.frames * depth
+        depth = self.form.channels
+        every = 0, self.form.frames * depth
         found = [*shapes, *(s for frame in squares for s in frame), *top]
-        self._kinds = outlines(
-            found, scale_of(self.scenario.scene, self.form), self.form
-        )
-        rows = [(every, last)] * len(shapes)
+        scale = scale_of(self.scenario.scene, self.form)
+        self._kinds = outlines(found, scale, self.form)
+        rows = [every] * len(shapes)
         for f, frame in enumerate(squares):
             rows += [(f * depth, (f + 1) * depth)] * len(frame)
-        rows += [(every, last)] * len(top)
+        rows += [every] * len(top)
         self._channels = np.array(rows, np.int64).reshape(-1, 2)
         self._below = len(found) - len(top)
         self._moves = bool(found)
@@ -202,8 +210,8 @@ class TableImages:
         game = self.scenario
         scene = game.scene
         marks = [mark_shapes(m, scene) for m in game.all_marks(state, dict(memory))]
-        below = [shape for lower, _ in marks for shape in lower]
-        top = [shape for _, upper in marks for shape in upper]
+        below = [self._visible(shape) for lower, _ in marks for shape in lower]
+        top = [self._visible(shape) for _, upper in marks for shape in upper]
         eliminated = game.eliminated(dict(memory))
         if eliminated is not None:
             below += closed_goals(scene, eliminated)
@@ -222,6 +230,11 @@ class TableImages:
                     ]
                 )
         return simple(below), [simple(frame) for frame in squares], simple(top)
+
+    def _visible(self, shape: Shape) -> Shape:
+        """Return the shape of a mark with lines that are wide enough."""
+        thinnest = THINNEST * USUAL_WIDTH / self.form.size
+        return replace(shape, line=max(shape.line, thinnest)) if shape.line else shape
 
     def _moving(self, state: Source, memory: Source, past: Source) -> tuple[Sink]:
         """Return the points (..., n, CORNERS, 2) and the visibility (..., n)."""
