@@ -102,6 +102,7 @@ def export_lerobot(
     with whole_folder(final) as folder:
         form = _form(head, seat)
         writer = LeRobotWriter(folder, round(rate), form.names)
+        film: FilmFrames | None = None
         for path, episode in episodes_with_steps(files):
             check_seat(episode, seat)
             gap = film_gap(path, episode, lengths[path]) if path in lengths else ""
@@ -112,7 +113,10 @@ def export_lerobot(
             if images:  # A policy that sees images must not see the true state.
                 frames.pop(TRUE_STATE, None)
             if path in films:
-                shown = _filmed(films[path], episode)
+                # Frames are read in order, so that a video is decoded once.
+                if film is None or film.path != films[path]:
+                    film = FilmFrames(films[path])
+                shown = _filmed(film, episode)
             else:
                 shown = _rendered(path, episode, head) if images else iter(())
             writer.add(frames, last, _task(head), shown)
@@ -211,13 +215,12 @@ def _times(episode: Episode) -> Columns:
     return {name: values for name, values in times.items() if np.isfinite(values).all()}
 
 
-def _filmed(film: Path, episode: Episode) -> Iterator[Array]:
+def _filmed(film: FilmFrames, episode: Episode) -> Iterator[Array]:
     """Yield the newest frame of a camera before each step, RGB."""
     if "frame" in episode.columns:
         shown = [episode.first["frame"][None], episode.columns["frame"]]
-        frames = FilmFrames(film)
         for number in np.maximum(np.concatenate(shown)[:-1], 0):
-            yield frames.picture(int(number))[..., ::-1]
+            yield film.picture(int(number))[..., ::-1]
 
 
 def _rendered(path: Path, episode: Episode, head: dict[str, Any]) -> Iterator[Array]:

@@ -46,7 +46,7 @@ class PixelSteps(NamedTuple):
 
     images: TableImages
     moving: Moving
-    """What moves on the images at each step (N, ...)."""
+    """Moving parts of the images at each step (N, ...)."""
     action: Array
     """Actions, -1 to 1, (N, 2), float32."""
     seat: int
@@ -116,7 +116,7 @@ def recorded_steps(
 
 
 def steps_of(replay: Replay, observe: str) -> list[Moving]:
-    """Return what moves on the images before each action of each replayed episode."""
+    """Return the moving parts of images before each action of replayed episodes."""
     observer, steps = replay.world.observer, list[Moving]()
     replay.begin()
     for t in range(int(replay.lengths.max())):

@@ -51,7 +51,7 @@ learner."""
 
 
 class Moving(NamedTuple):
-    """What moves on the images of W worlds."""
+    """Moving parts of the images of W worlds."""
 
     frames: Array
     """Sensed positions, table frame, m, and angles (W, F, N, 3), the newest last."""
@@ -142,7 +142,7 @@ class TableImages:
     def collect(
         self, frames: Array, state: Source, memory: Source, worlds: Rows = ALL
     ) -> Moving:
-        """Return what moves on the images of W worlds.
+        """Return the moving parts of the images of W worlds.
 
         Args:
             frames: Sensed positions, table frame, m, and angles (B, F, N, 3), the

@@ -62,6 +62,27 @@ def add(cover: Array, low: float, high: float, sign: float) -> None:
 
 
 @inner(error_model="numpy")
+def band(points: Array, half: float, edges: Array) -> int:
+    """Fill in the corners of a line without its round ends; return their number.
+
+    Args:
+        points: Ends of the line (2 or more, 2), pixels.
+        half: Half of the width, pixels.
+        edges: Corners (4 or more, 2), which are overwritten.
+    """
+    dx, dy = points[1, 0] - points[0, 0], points[1, 1] - points[0, 1]
+    size = math.sqrt(dx * dx + dy * dy)
+    if size <= 0.0:
+        return 0
+    ux, uy = -dy / size * half, dx / size * half
+    for k in range(4):
+        end, sign = (k + 1) // 2 % 2, 1.0 if k < 2 else -1.0
+        edges[k, 0] = points[end, 0] + sign * ux
+        edges[k, 1] = points[end, 1] + sign * uy
+    return 4
+
+
+@inner(error_model="numpy")
 def paint(
     image: Array,
     first: int,
@@ -97,15 +118,7 @@ def paint(
     height, width = image.shape[0], image.shape[1]
     sides, grown = 0, outer if count < 3 else 0.0
     if count == 2:
-        dx, dy = points[1, 0] - points[0, 0], points[1, 1] - points[0, 1]
-        size = math.sqrt(dx * dx + dy * dy)
-        if size > 0.0:
-            sides = 4
-            ux, uy = -dy / size * outer, dx / size * outer
-            for k in range(4):
-                end, sign = (k + 1) // 2 % 2, 1.0 if k < 2 else -1.0
-                edges[k, 0] = points[end, 0] + sign * ux
-                edges[k, 1] = points[end, 1] + sign * uy
+        sides = band(points, outer, edges)
     elif count > 2:
         sides = count
         edges[:count] = points[:count]
