@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
+from pathlib import Path
 
 import numpy as np
 
@@ -13,13 +14,21 @@ from marl_airhockey.registry import (
     make_driver,
 )
 from marl_airhockey.sim.contracts.backend import Backend, LiveBackend
+from marl_airhockey.sim.contracts.camera_model import CameraModel, lab_camera
 from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.image_form import (
+    CameraForm,
+    image_form,
+    shows_camera,
+)
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.checks import check_count
 from marl_airhockey.sim.core.errors import (
     unknown_name,
 )
 from marl_airhockey.sim.core.physics import Physics
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.table import TABLES, Table
 from marl_airhockey.sim.jit.threads import threads
 from marl_airhockey.sim.world.keywords import Keywords, check_keywords
 from marl_airhockey.sim.world.world import World
@@ -71,7 +80,49 @@ def build_world(
     own = [driver.observe for driver in drivers.values() if driver.observe]
     # Each type occurs once. The first one is the type of the open seats.
     every = dict.fromkeys([keywords.get("observe", usual), *own, *forms])
-    return World(game, backend, drivers, physics, tuple(every), max_cycles, autoreset)
+    parts = game, backend, drivers, physics, tuple(every), max_cycles, autoreset
+    return World(*parts, camera_models(every, game.scene, backend))
+
+
+def camera_models(
+    forms: Iterable[str], scene: Scene, backend: Backend | None = None
+) -> dict[str, CameraModel]:
+    """Return the cameras of the observation types that show one.
+
+    Args:
+        forms: Observation types.
+        scene: Scene on the table.
+        backend: Backend. A real table has a camera of its own.
+
+    Raises:
+        ValueError: The file of a rig is not valid, or describes another table.
+    """
+    shown = {form: image_form(form) for form in forms if shows_camera(form)}
+    if isinstance(backend, LiveBackend):
+        return dict.fromkeys(shown, backend.camera_model)
+    return {
+        form: _rig_camera(form, settings.rig, scene.table)
+        for form, settings in shown.items()
+        if isinstance(settings, CameraForm)
+    }
+
+
+def _rig_camera(form: str, rig: str, table: Table) -> CameraModel:
+    """Return the camera of a rig, by its file; "" for the camera of the virtual lab."""
+    if not rig:
+        return lab_camera(table)
+    from marl_airhockey.hardware.rig import Rig
+
+    try:
+        known = Rig.load(Path(rig))
+    except ValueError as error:
+        raise ValueError(f"observe: {form!r}: {error}") from error
+    if TABLES[known.table] != table:
+        raise ValueError(
+            f"observe: {form!r}: the scenario's table is not the rig's "
+            f'{known.table!r}; pass options={{"table": "{known.table}"}}'
+        )
+    return known.camera_model
 
 
 def build_driven_world(

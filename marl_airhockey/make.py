@@ -48,8 +48,8 @@ def parallel_env(
               of the physics: "ideal", "ur5e", "ur5e-calibrated", "ur5e-authors",
               "gantry", or a TOML file.
             - observe (str, default "velocity" with the profile "ideal", otherwise
-              "history"): Observation type: "velocity", "estimate", "history" or
-              "pixels", see `observable.OBSERVE`.
+              "history"): Observation type: "velocity", "estimate", "history",
+              "pixels" or "camera", see `observable.OBSERVE`.
             - goals (str, default "flat"): Form of goals. With "dict", an observation is
               a dictionary with desired and achieved goal, and the reward is 0 or 1.
             - physics (dict, str or Path, default {}): Parameters by name, the name of a

@@ -26,7 +26,7 @@ from marl_airhockey.registry import (
     zoo_names,
 )
 from marl_airhockey.rollouts.as_trained import as_trained
-from marl_airhockey.sim.contracts.image_form import IMAGES
+from marl_airhockey.sim.contracts.image_form import CAMERA, IMAGES
 from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.sim.jit import shipped
 from marl_airhockey.sim.jit.cache import used
@@ -97,9 +97,11 @@ def precompile(
 
 
 def _images() -> Iterator[tuple[str, Keywords]]:
-    """Yield each scenario with keywords for images."""
+    """Yield each scenario with keywords for images, and for a camera if it has one."""
     for name in scenario_names():
         yield name, Keywords(observe=IMAGES)
+        if len(find_scenario(name).scene.seats) == 1:
+            yield name, Keywords(observe=CAMERA)
 
 
 def _drivers() -> Iterator[tuple[str, Keywords]]:

@@ -20,6 +20,7 @@ from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.rig_file import rig_fields
 from marl_airhockey.hardware.vision import Detector
 from marl_airhockey.hardware.vision.calibration import view_trouble
+from marl_airhockey.sim.contracts.camera_model import PADDLE_TOP
 from marl_airhockey.sim.core.recording import FILM
 from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
@@ -28,8 +29,6 @@ LOOKED = 5
 """Number of frames, spread over a video, in which the tags are searched."""
 SEVERAL = 0.1
 """Largest share of frames with two pucks in a video."""
-PADDLE_TOP = 0.06
-"""Height of the top of a paddle above the table, m."""
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,8 @@ SEED = 20261128
 """Seed of all games."""
 IMAGES = "pixels:colour=rgb,frames=2"
 """Observation type of the games with images."""
+FRAMES = "camera:colour=rgb,frames=2"
+"""Observation type of the games with a camera."""
 SCRIPT = "allround"
 """Script that plays in every scenario."""
 
@@ -47,12 +49,15 @@ class FixedGame(NamedTuple):
 
 
 def games() -> Iterator[FixedGame]:
-    """Yield all games: scripts, images, "ur5e", and policies of the zoo."""
+    """Yield all games: scripts, images, cameras, "ur5e", and policies of the zoo."""
     for scenario in scenario_names():
         scripted = Keywords(drivers=_drivers(scenario, SCRIPT))
         yield FixedGame(f"{scenario} with {SCRIPT}", scenario, scripted)
         images = Keywords(observe=IMAGES)
         yield FixedGame(f"{scenario} with images", scenario, images)
+        if len(find_scenario(scenario).scene.seats) == 1:
+            frames = Keywords(observe=FRAMES)
+            yield FixedGame(f"{scenario} with a camera", scenario, frames)
         keywords = Keywords(profile="ur5e")
         yield FixedGame(f"{scenario} with random actions in ur5e", scenario, keywords)
     for name in zoo_names():
@@ -95,5 +100,7 @@ def _numbers(world: World, steps: int) -> Iterator[Any]:
         result = world.step(actions.uniform(-1.0, 1.0, seats, 2))
         state = world.state
         yield from (state.position, state.velocity, state.angle, state.spin)
-        yield from (world.outcome["reward"], world.observe(np.arange(seats)))
+        shown = world.observe(np.arange(seats))
+        yield world.outcome["reward"]
+        yield from shown.values() if isinstance(shown, Mapping) else (shown,)
         yield from (result.terminated, result.truncated)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from marl_airhockey.hardware.robot.mounting import Mounting
 from marl_airhockey.hardware.robot.shaper import MotionLimits
 from marl_airhockey.hardware.vision.colour import Colour
 from marl_airhockey.hardware.vision.lens import CameraView
+from marl_airhockey.sim.contracts.camera_model import BLOCK, PADDLE, CameraModel
 from marl_airhockey.sim.core.checks import build, check_fields
 from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.sim.core.table import TABLES
@@ -81,11 +83,19 @@ class Rig:
     """Colour of the block; None without one."""
     paddle: Colour | None = None
     """Colour of the paddle's top, for its detection in videos; None if unknown."""
+    exposure: float = 1 / 120
+    """Exposure time of the camera, s."""
+    period: float = 1 / 60
+    """Time between two frames of the camera, s, which ``airhockey calibrate delay``
+    measures."""
+    dropped: float = 0.0
+    """Share of the camera's frames that do not arrive, which it measures, too."""
     made: str = ""
     """Date of the calibration."""
 
     def __post_init__(self) -> None:
-        check_fields(self, payload=PAYLOADS, latency=(0, 1), readout=(0, 0.1))
+        times = dict.fromkeys(("exposure", "readout", "period"), (0, 0.1))
+        check_fields(self, payload=PAYLOADS, latency=(0, 1), dropped=(0, 0.5), **times)
         if self.table not in TABLES:
             raise ValueError(f"table: {unknown_name('table', self.table, TABLES)}")
         if self.operator != "person" and not LAB.fullmatch(self.operator):
@@ -119,6 +129,24 @@ class Rig:
             f"{low:+.2f} .. {high:+.2f} m of the table's centre, with up to "
             f"{self.limits.speed} m/s. A stop begins within {LATEST} s, and the paddle "
             f"comes to rest within {stop:.2f} m. The arm moves above and behind it."
+        )
+
+    @cached_property
+    def camera_model(self) -> CameraModel:
+        """Model of the camera, for observations in a simulation."""
+        view, base = self.view, self.mounting.to_table(np.zeros(3)).tolist()
+        return CameraModel(
+            view.lens.matrix,
+            view.lens.distortion,
+            view.lens.size,
+            tuple(tuple(row) for row in view.matrix.tolist()),
+            view.translation,
+            (base[0], base[1]),
+            *(self.latency, self.period, self.exposure, self.dropped),
+            puck=self.puck.rgb,
+            paddle=self.paddle.rgb if self.paddle else PADDLE,
+            block=self.block.rgb if self.block else BLOCK,
+            tags=tuple(tuple((x, y) for x, y in four) for four in self.tags.values()),
         )
 
     @property

@@ -10,25 +10,44 @@ from torch import nn
 
 from marl_airhockey.learn.image_networks import ResidualBlock, Shape
 from marl_airhockey.learn.onnx_export import Graph
+from marl_airhockey.sim.contracts.image_form import (
+    OWN,
+    OWN_SIZE,
+    PIXELS,
+    shows_camera,
+)
 
 
 def save_image_policy(
-    layers: nn.Module, shape: Shape, card: dict[str, Any], path: Path
+    features: nn.Module,
+    head: nn.Module,
+    shape: Shape,
+    card: dict[str, Any],
+    path: Path,
 ) -> None:
-    """Write a policy that observes images as an ONNX model.
+    """Write a policy that observes images or a camera as an ONNX model.
+
+    The inputs of a policy that observes a camera are named as the entries of an
+    observation.
 
     Args:
-        layers: Layers from inputs (n, channels, H, W), see `image_networks.darkness`,
-            to actions (n, 2).
-        shape: Shape of an observation.
-        card: Card of the policy.
+        features: Layers from inputs (n, channels, H, W), see
+            `image_networks.darkness`, to features (n, k).
+        head: Layers from features, followed by the other inputs, to actions (n, 2).
+        shape: Shape of an image.
+        card: Card of the policy, with its observation type.
         path: Path of the file.
     """
-    graph = Graph()
-    x = graph.node("Transpose", "observation", perm=[0, 3, 1, 2])
+    inputs: dict[str, tuple[int, ...]] = {"observation": shape}
+    if shows_camera(card["observe"]):
+        inputs = {PIXELS: shape, OWN: (OWN_SIZE,)}
+    graph, (first, *more) = Graph(), inputs
+    x = graph.node("Transpose", first, perm=[0, 3, 1, 2])
     x = graph.node("Div", x, graph.constant("white", 255.0))
     x = graph.node("Sub", graph.constant("one", 1.0), x)
-    graph.save(_add(graph, layers, x, "layers"), shape, card, path)
+    x = _add(graph, features, x, "features")
+    x = graph.node("Concat", x, *more, axis=-1) if more else x
+    graph.save(_add(graph, head, x, "head"), inputs, card, path)
 
 
 def _add(graph: Graph, layer: nn.Module, x: str, name: str) -> str:

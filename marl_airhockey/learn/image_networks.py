@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from marl_airhockey.sim.contracts.image_form import OWN, PIXELS
 from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.world.observation import Observation
 from marl_airhockey.types import Array
 
 Shape = tuple[int, int, int]
@@ -88,38 +89,55 @@ class ImageActor(nn.Module):
     """Actor on images (n, H, W, channels), 0 to 255; actions are (n, 2).
 
     Args:
-        shape: Shape of an observation.
+        shape: Shape of an image.
         network: Name of the convolutional layers, see `NETWORKS`.
         hidden: Widths of the hidden layers after them.
+        own: Number of other inputs, which the hidden layers receive, too.
 
     Raises:
         ValueError: The network is unknown.
     """
 
-    def __init__(self, shape: Shape, network: str, hidden: Sequence[int]) -> None:
+    def __init__(
+        self, shape: Shape, network: str, hidden: Sequence[int], own: int = 0
+    ) -> None:
         super().__init__()
         if network not in NETWORKS:
             raise ValueError(unknown_name("network", network, list(NETWORKS)))
         self.shape = shape
-        layers = [*NETWORKS[network](shape[2])]
+        self.features = NETWORKS[network](shape[2])
         with torch.no_grad():
             blank = torch.zeros(1, shape[2], *shape[:2])
-            size = nn.Sequential(*layers)(blank).shape[1]
+            size = self.features(blank).shape[1] + own
+        layers: list[nn.Module] = []
         for width in hidden:
             layers += [nn.Linear(size, width), nn.ReLU()]
             size = width
-        self.layers = nn.Sequential(*layers, nn.Linear(size, 2))
+        self.head = nn.Sequential(*layers, nn.Linear(size, 2))
 
-    def forward(self, images: Tensor) -> Tensor:
-        found: Tensor = self.layers(darkness(images.permute(0, 3, 1, 2) / 255.0))
+    def forward(self, images: Tensor, own: Tensor | None = None) -> Tensor:
+        features = self.features(darkness(images.permute(0, 3, 1, 2) / 255.0))
+        if own is not None:
+            features = torch.cat([features, own], -1)
+        found: Tensor = self.head(features)
         return found
 
-    def predict(self, observation: Any, deterministic: bool) -> Array:
-        """Return actions (n, 2) for images (n, H, W, channels)."""
+    def at(self, observation: Observation) -> Tensor:
+        """Return actions (n, 2) for observations of images or of a camera."""
+        device = next(self.parameters()).device
+        parts = (
+            [observation[name] for name in (PIXELS, OWN)]
+            if isinstance(observation, Mapping)
+            else [observation]
+        )
+        arrays = (np.asarray(part, np.float32) for part in parts)
+        found: Tensor = self(*(torch.from_numpy(a).to(device) for a in arrays))
+        return found
+
+    def predict(self, observation: Observation, deterministic: bool) -> Array:
+        """Return actions (n, 2) for observations of images or of a camera."""
         with torch.inference_mode():
-            rows = torch.from_numpy(np.asarray(observation, np.float32))
-            device = next(self.parameters()).device
-            return np.asarray(self(rows.to(device)).cpu().numpy())
+            return np.asarray(self.at(observation).cpu().numpy())
 
 
 def _convolution(channels: int, width: int, size: int, stride: int) -> list[nn.Module]:

@@ -19,7 +19,7 @@ OPSET = 17
 
 
 class Graph:
-    """Graph of operations on the input ``observation``."""
+    """Graph of operations on the inputs of a policy."""
 
     def __init__(self) -> None:
         self._nodes: list[onnx.NodeProto] = []
@@ -45,25 +45,27 @@ class Graph:
         return name
 
     def save(
-        self, last: str, shape: tuple[int, ...], card: Mapping[str, Any], path: Path
+        self,
+        last: str,
+        inputs: Mapping[str, tuple[int, ...]],
+        card: Mapping[str, Any],
+        path: Path,
     ) -> None:
         """Write the model of a policy; the file is replaced atomically.
 
         Args:
             last: Name of the value that is the action before clipping.
-            shape: Shape of an observation.
+            inputs: Shape of a row of each input, by name.
             card: Card of the policy.
             path: Path of the file.
         """
         bounds = self.constant("low", -1.0), self.constant("high", 1.0)
         self._nodes.append(helper.make_node("Clip", [last, *bounds], ["action"]))
-        given, made = (
+        *given, made = (
             helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *sizes])
-            for name, sizes in (("observation", shape), ("action", (2,)))
+            for name, sizes in (*inputs.items(), ("action", (2,)))
         )
-        graph = helper.make_graph(
-            self._nodes, "policy", [given], [made], self._constants
-        )
+        graph = helper.make_graph(self._nodes, "policy", given, [made], self._constants)
         model = helper.make_model(
             graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8
         )
@@ -93,4 +95,4 @@ def save_onnx(policy: NumpyPolicy, path: Path) -> None:
         x = graph.node("Gemm", x, *map(graph.constant, names, arrays))
     if policy.card.get("bounded"):
         x = graph.node("Tanh", x)
-    graph.save(x, (len(policy.centre),), policy.card, path)
+    graph.save(x, {"observation": (len(policy.centre),)}, policy.card, path)

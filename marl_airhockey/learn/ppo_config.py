@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 from marl_airhockey.learn.self_play_config import SelfPlayConfig
 from marl_airhockey.learn.settings import check_names
 from marl_airhockey.registry import find_scenario
-from marl_airhockey.sim.contracts.image_form import shows_images
+from marl_airhockey.sim.contracts.image_form import shows_camera, shows_images
 from marl_airhockey.sim.core.profiles import SUFFIX, find_profile
 
 
@@ -73,6 +73,11 @@ class PPOConfig(SelfPlayConfig):
             raise ValueError(
                 f"engine: {self.engine} learns from flat observations; use sb3 for "
                 'observe="pixels" and goals="dict"'
+            )
+        if shows_camera(self.observe):
+            raise ValueError(
+                f"observe: PPO does not learn from a camera ({self.observe}); clone "
+                'recordings with algo="bc", or choose observe="pixels"'
             )
         if self.self_play and shows_images(self.observe):
             raise ValueError(

@@ -123,10 +123,10 @@ class SB3Trainer:
         network: Any = self._model.policy
         card = vars(self._model)["card"]
         seen, hidden = network.features_extractor, network.mlp_extractor.policy_net
-        layers = torch.nn.Sequential(seen.layers, hidden, network.action_net)
+        head = torch.nn.Sequential(hidden, network.action_net)
         shape = image_form(self._run.config.observe).shape
         card = {**card, "steps": self._model.num_timesteps}
-        save_image_policy(layers, shape, card, folder / f"{name}.onnx")
+        save_image_policy(seen.layers, head, shape, card, folder / f"{name}.onnx")
 
 
 def learn_for(model: BaseAlgorithm, steps: int, slots: SlotEnv) -> None:

@@ -169,6 +169,6 @@ def _row(observation: Any, k: int) -> Any:
 
 def _shape(observation: Any) -> tuple[int, ...]:
     if isinstance(observation, Mapping):
-        observation = observation["observation"]
+        observation = next(iter(observation.values()))
     shape: tuple[int, ...] = observation.shape
     return shape

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from marl_airhockey.policies.policy import Policy, trained_in
+from marl_airhockey.sim.contracts.image_form import OWN, PIXELS
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.types import Array
 
@@ -51,17 +53,24 @@ class _OnnxModel:
         return found if isinstance(found, dict) else {}
 
     def __call__(self, observation: Any, deterministic: bool) -> Array:
-        rows = np.asarray(observation, np.float32)
+        names = [given.name for given in self.inputs]
+        parts = (
+            [observation[name] for name in names]
+            if isinstance(observation, Mapping)
+            else [observation]
+        )
+        rows = [np.asarray(part, np.float32) for part in parts]
         if self.inputs[0].shape[0] == 1:  # Its batch size is fixed.
-            return np.concatenate([self._actions(row[None]) for row in rows])
-        return self._actions(rows)
+            single = ([part[i : i + 1] for part in rows] for i in range(len(rows[0])))
+            return np.concatenate([self._actions(names, row) for row in single])
+        return self._actions(names, rows)
 
-    def _actions(self, rows: Array) -> Array:
-        out = np.asarray(self._session.run(None, {self.inputs[0].name: rows})[0])
-        if out.shape != (len(rows), 2):
+    def _actions(self, names: list[str], rows: list[Array]) -> Array:
+        inputs = dict(zip(names, rows, strict=True))
+        out, shape = np.asarray(self._session.run(None, inputs)[0]), (len(rows[0]), 2)
+        if out.shape != shape:
             raise ValueError(
-                f"{self._source}: expected actions of shape {(len(rows), 2)}, got "
-                f"{out.shape}"
+                f"{self._source}: expected actions of shape {shape}, got {out.shape}"
             )
         return out
 
@@ -71,6 +80,8 @@ class _OnnxModel:
         Raises:
             ValueError: The inputs or outputs are different. The message names them.
         """
+        if {given.name for given in self.inputs} == {PIXELS, OWN}:
+            return  # It observes a camera.
         expected = f"{self._source}: expected one input, float32 (B, D)"
         if len(self.inputs) != 1:
             raise ValueError(f"{expected}; found {len(self.inputs)} inputs")

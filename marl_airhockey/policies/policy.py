@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.sim.contracts.driver import Driver, View
+from marl_airhockey.sim.contracts.image_form import PIXELS
 from marl_airhockey.types import Array
 
 Predict = Callable[[Any, bool], Array]
@@ -27,7 +28,8 @@ class Policy(Driver):
 
     Args:
         predict: Function (observations (B, ...), deterministic) -> actions (B, 2).
-        shape: Shape of an observation in training; None if unknown.
+        shape: Shape of an observation, or of its images, in training; None if
+            unknown.
         observe: Observation type in training; None for the type of the environment.
         source: Origin of the policy, for messages.
         deterministic: True to act with mean actions, False to act with samples.
@@ -55,8 +57,10 @@ class Policy(Driver):
         return np.clip(action, -1.0, 1.0), memory
 
     def check(self, observation: Array | Mapping[str, Array]) -> None:
-        if isinstance(observation, Mapping):
-            shape: tuple[int, ...] = (sum(x.shape[1] for x in observation.values()),)
+        if isinstance(observation, Mapping) and PIXELS in observation:
+            shape: tuple[int, ...] = observation[PIXELS].shape[1:]
+        elif isinstance(observation, Mapping):
+            shape = (sum(x.shape[1] for x in observation.values()),)
         else:
             shape = observation.shape[1:]
         if self.shape not in (None, shape):

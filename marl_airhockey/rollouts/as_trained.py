@@ -11,7 +11,7 @@ from marl_airhockey.policies.policy import Policy
 from marl_airhockey.policies.trust import is_trusted_code, require_trust
 from marl_airhockey.registry import find_scenario, make_driver, runs_code
 from marl_airhockey.sim.contracts.driver import Driver
-from marl_airhockey.sim.contracts.image_form import image_form, shows_images
+from marl_airhockey.sim.contracts.image_form import kind_of_images
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.world.keywords import Keywords
 
@@ -77,8 +77,7 @@ def seen_in(player: Driver, keywords: Keywords) -> Driver:
     observe = keywords.get("observe")
     if observe and isinstance(player, Policy):
         own = player.observe or observe
-        forms = [image_form(f) if shows_images(f) else None for f in (own, observe)]
-        if forms[0] != forms[1]:
+        if kind_of_images(own) != kind_of_images(observe):
             raise ValueError(
                 f"{player.source}: it was trained with observe={own!r}, not with "
                 f"{observe!r}; omit observe"

@@ -14,6 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from marl_airhockey.build import camera_models
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.rollouts.collector import Collector
 from marl_airhockey.rollouts.columns import (
@@ -135,7 +136,12 @@ class Replay:
         physics = _physics(head, episodes, game, played)
         form = observe or str(head.get("observe", "velocity"))
         cycles = int(head["max_cycles"]) if self._same else None
-        self.world = World(game, backend, {}, physics, (form,), cycles, autoreset=False)
+        cameras = camera_models((form,), game.scene)
+        self.world = World(
+            *(game, backend, {}, physics, (form,), cycles),
+            autoreset=False,
+            cameras=cameras,
+        )
         """Worlds of the episodes, with all seats open."""
         self._seeds = [episode.seed or 0 for episode in episodes]
         self._numbers = np.array([episode.number for episode in episodes])

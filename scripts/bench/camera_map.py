@@ -21,7 +21,6 @@ import numpy as np
 from marl_airhockey.hardware.camera import CameraFrame
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.lab.table_camera import Seen, TableCamera, tag_places
-from marl_airhockey.hardware.robot.nominal import BEHIND
 from marl_airhockey.hardware.vision import Colour, Detector
 from marl_airhockey.hardware.vision.boards import find_board, lens_from_boards
 from marl_airhockey.hardware.vision.calibration import (
@@ -33,6 +32,7 @@ from marl_airhockey.hardware.vision.calibration import (
 )
 from marl_airhockey.hardware.vision.edges import refine_corners
 from marl_airhockey.hardware.vision.lens import CameraView, Lens
+from marl_airhockey.sim.contracts.camera_model import BEHIND
 from marl_airhockey.types import Array
 
 SETUP = LabSetup()

@@ -34,7 +34,6 @@ from marl_airhockey.hardware.lab.table_camera import (
     tag_places,
 )
 from marl_airhockey.hardware.lab.world import RATE, LabWorld
-from marl_airhockey.hardware.robot.nominal import BEHIND
 from marl_airhockey.hardware.table.tracker import Tracker
 from marl_airhockey.hardware.vision import Colour, Detector, Sighting
 from marl_airhockey.hardware.vision.calibration import (
@@ -45,6 +44,7 @@ from marl_airhockey.hardware.vision.calibration import (
 )
 from marl_airhockey.hardware.vision.edges import refine_corners
 from marl_airhockey.hardware.vision.lens import CameraView
+from marl_airhockey.sim.contracts.camera_model import BEHIND
 from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.types import Array
 

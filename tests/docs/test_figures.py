@@ -14,7 +14,9 @@ from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.hardware.rig import LATEST
 from marl_airhockey.hardware.robot import MotionLimits
 from marl_airhockey.registry import scenario_names, zoo_names
+from marl_airhockey.sim.contracts.camera_model import lab_camera
 from marl_airhockey.sim.core.profiles import PROFILES
+from marl_airhockey.sim.core.table import TABLES
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "docs/data"
@@ -284,8 +286,23 @@ def test_speed_of_images_is_that_of_its_rows():
         for title in titles.values():
             assert line[title] == f"{rates[scenario, worlds, title]:,.0f}"
     spreads = [100 * row["spread"] for row in rows]
+    frames = json.loads((DATA / "camera_speed.json").read_text())
+    one, some, many = (f"{row['agent_steps_per_cpu_s']:,.0f}" for row in frames)
     text = " ".join(Path("docs/image_observations.md").read_text().split())
+    assert f"{one} of them with 1 world, {some} with 64 and {many} with 1,024" in text
     assert f"{min(spreads):.0f} to {max(spreads):.0f} % of the median" in text
+
+
+def test_agreement_of_camera_frames_is_that_of_its_rows():
+    row = json.loads((DATA / "camera_images.json").read_text())
+    text = " ".join(Path("docs/image_observations.md").read_text().split())
+    levels = f"by {row['mean']:.1f} of 255 on average, and 98 % of the values differ by"
+    assert f"{levels} at most {row['quantile_98']:.0f}." in text
+    most = row["puck_centre_most_px"]
+    # A pixel of the image shows 1/84 of the window.
+    window = lab_camera(TABLES["full_size"]).window(TABLES["full_size"])
+    metres = most * window.side / row["size"] / (602.0 / 2.15)
+    assert f"at most {most:.2f} pixels, which is {1e3 * metres:.0f} mm" in text
 
 
 def test_results_of_image_policies_are_those_of_their_rows():

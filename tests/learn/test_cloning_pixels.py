@@ -37,22 +37,32 @@ def expert(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("profile", ["ideal", "gantry"])
-def test_images_of_a_recording_are_those_that_were_observed(tmp_path, profile):
+@pytest.mark.parametrize(
+    ("profile", "observe"),
+    [
+        ("ideal", "pixels:size=64"),
+        ("gantry", "pixels:size=64"),
+        ("gantry", "camera:size=64"),
+    ],
+)
+def test_images_of_a_recording_are_those_that_were_observed(tmp_path, profile, observe):
     player, keywords = make_driver("zoo/hit_goal"), {"profile": profile}
     form = {"observe": "velocity"} if profile == "ideal" else {}
     path = record_episodes(
         player, "zoo", "hit_goal", 3, tmp_path / "a", 3, {**keywords, **form}
     )
-    data = recorded_steps([path], "pixels:size=64", 0, 1.0)
-    env = ah.gym_env("hit_goal", observe="pixels:size=64", **keywords)
+    data = recorded_steps([path], observe, 0, 1.0)
+    env = ah.gym_env("hit_goal", observe=observe, **keywords)
     row = 0
     for seed in (3, 4, 5):
         seen, _ = env.reset(seed=seed)
         done = False
         while not done:
             images, actions = data.at(np.array([row]))
-            np.testing.assert_array_equal(images[0], seen)
+            shown = seen if isinstance(seen, dict) else {"pixels": seen}
+            known = images if isinstance(images, dict) else {"pixels": images}
+            for name, part in known.items():
+                np.testing.assert_array_equal(part[0], shown[name])
             seen, _, terminated, truncated, _ = env.step(actions[0])
             done, row = terminated or truncated, row + 1
     assert row == len(data.action)
@@ -68,8 +78,9 @@ def test_a_share_of_the_steps_is_of_the_best_episodes(expert):
     )
 
 
-def test_a_run_from_pixels_goes_on_and_leaves_an_onnx_policy(expert, tmp_path):
-    config = offline_config("bc", [expert], SMALL)
+@pytest.mark.parametrize("observe", ["pixels", "camera"])
+def test_a_run_from_images_goes_on_and_leaves_an_onnx_policy(expert, tmp_path, observe):
+    config = offline_config("bc", [expert], {**SMALL, "observe": observe})
     calls = []
 
     def stop(done, total, row):
@@ -82,14 +93,16 @@ def test_a_run_from_pixels_goes_on_and_leaves_an_onnx_policy(expert, tmp_path):
     row = run_training(None, tmp_path)
     assert row["steps"] == 200
     policy = ah.load_policy(tmp_path / "last.onnx")
-    assert (policy.observe, policy.shape) == ("pixels", (84, 84, 3))
+    assert (policy.observe, policy.shape) == (observe, (84, 84, 3))
     weights = torch.load(tmp_path / "last.pt", weights_only=True)
-    actor = ImageActor((84, 84, 3), "small", [16])
+    actor = ImageActor((84, 84, 3), "small", [16], 4 if observe == "camera" else 0)
     actor.load_state_dict(weights["model"])
-    pictures = np.random.default_rng(0).integers(0, 256, (5, 84, 84, 3), np.uint8)
-    with torch.inference_mode():
-        expected = actor(torch.from_numpy(pictures).float()).clamp(-1, 1).numpy()
-    np.testing.assert_allclose(policy.predict(pictures, True), expected, atol=1e-4)
+    rng = np.random.default_rng(0)
+    seen = rng.integers(0, 256, (5, 84, 84, 3), np.uint8)
+    if observe == "camera":
+        seen = {"pixels": seen, "agent_pos": rng.normal(size=(5, 4))}
+    expected = actor.predict(seen, True).clip(-1, 1)
+    np.testing.assert_allclose(policy.predict(seen, True), expected, atol=1e-4)
     found = ah.evaluate(tmp_path, episodes=2)
     assert (found.scenario, found.episodes) == ("hit_goal", 2)
 
@@ -113,7 +126,8 @@ def test_an_onnx_model_acts_like_its_network(network, tmp_path):
         torch.nn.init.normal_(norm.weight)
         torch.nn.init.normal_(norm.bias)
     card = {"observe": "pixels:size=48,frames=2"}
-    save_image_policy(actor.layers, shape, card, tmp_path / "a.onnx")
+    parts = actor.features, actor.head, shape
+    save_image_policy(*parts, card, tmp_path / "a.onnx")
     policy = ah.load_policy(tmp_path / "a.onnx")
     images = np.random.default_rng(0).integers(0, 256, (3, *shape), np.uint8)
     expected = actor.predict(images, True).clip(-1, 1)

@@ -40,26 +40,37 @@ def delay(
     """Measure the latency of the camera and of the arm by movements of the arm.
 
     The arm moves back and forth by 9 cm. If the camera is a v4l2 device, its mean
-    latency is written to the rig file.
+    latency and the times of its frames are written to the rig file.
     """
     from marl_airhockey.hardware.calibration.delay import measure_delays
 
     with moving_arm(lab, rig, trials) as (known, path, tell):
         found = measure_delays(known, trials, tell)
         if known.camera.startswith("v4l2:"):
-            replace(known, latency=float(found.camera.mean())).save(path)
+            measured = replace(
+                known,
+                latency=float(found.camera.mean()),
+                period=found.period,
+                dropped=found.dropped,
+            )
+            measured.save(path)
     parts = found.camera, found.arm, found.round_trip
     rows = {name: summarize(part) for name, part in zip(NAMES, parts, strict=True)}
     if plot is not None:
         _plot(found, plot)
     if as_json:
-        console.print_json(json.dumps({"trials": len(found.camera), **rows}))
+        frames = {"period": found.period, "dropped": found.dropped}
+        count = len(found.camera)
+        console.print_json(json.dumps({"trials": count, **rows, **frames}))
         return
     table = Table("delay, ms", "mean", "sd", "least", "most")
     for name, row in rows.items():
         table.add_row(name, *(f"{1e3 * value:.1f}" for value in row.values()))
     console.print(table)
-    console.print(f"{len(found.camera)} of {trials} trials")
+    console.print(
+        f"{len(found.camera)} of {trials} trials; a frame every "
+        f"{1e3 * found.period:.1f} ms, {found.dropped:.1%} did not arrive"
+    )
 
 
 def _plot(found: Delays, path: Path) -> None:

@@ -25,10 +25,9 @@ from marl_airhockey.hardware.vision.calibration import (
 )
 from marl_airhockey.hardware.vision.edges import refine_corners
 from marl_airhockey.hardware.vision.lens import CameraView, Lens
+from marl_airhockey.sim.contracts.camera_model import PADDLE_TOP
 from marl_airhockey.types import Array
 
-PADDLE_TOP = 0.06
-"""Height of the centre of a paddle's outline from above, m."""
 AVERAGED = 6
 """Number of frames over which corners and positions are averaged."""
 

@@ -8,17 +8,17 @@ All times are of the same clock.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey.hardware.calibration.camera_session import PADDLE_TOP
 from marl_airhockey.hardware.calibration.motion import lead
-from marl_airhockey.hardware.camera import Camera, open_source
+from marl_airhockey.hardware.camera import Camera, CameraFrame, open_source
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot import Robot
 from marl_airhockey.hardware.vision import Detector
+from marl_airhockey.sim.contracts.camera_model import PADDLE_TOP
 from marl_airhockey.sim.core.seat import make_seat
 from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
@@ -37,17 +37,34 @@ SETTLE = 1.0
 
 @dataclass(frozen=True)
 class Delays:
-    """Delays of n trials, s."""
+    """Delays of n trials, s, and the times of the frames."""
 
     camera: Array
     """Times (n,) from a position of the paddle until its frame has arrived."""
     arm: Array
     """Times (n,) from a commanded position until the arm has reached it."""
+    period: float
+    """Time between two frames, s."""
+    dropped: float
+    """Share of the frames that did not arrive."""
 
     @property
     def round_trip(self) -> Array:
         """Times (n,) from a commanded position until its frame has arrived, s."""
         return self.camera + self.arm
+
+
+def frame_times(frames: Sequence[CameraFrame]) -> tuple[float, float]:
+    """Return the time between two frames, s, and the share that did not arrive.
+
+    Args:
+        frames: At least two frames, in the order of their arrival.
+    """
+    numbers = np.array([frame.number for frame in frames])
+    taken = np.array([frame.taken for frame in frames])
+    steps = np.diff(numbers)
+    count = numbers[-1] - numbers[0] + 1
+    return float(np.median(np.diff(taken) / steps)), float(1.0 - len(frames) / count)
 
 
 class Watch(threading.Thread):
@@ -110,7 +127,8 @@ def measure_delays(
         Camera(open_source(rig.camera, rig.latency)) as camera,
         Robot(rig.robot_config(reach)) as robot,
     ):
-        watch = Watch(camera, Detector(*parts))
+        watch, frames = Watch(camera, Detector(*parts)), list[CameraFrame]()
+        camera.listeners.append(lambda frame: frames.append(_without_image(frame)))
         home = np.mean(reach, 0)
         robot.go_to(home)
         watch.start()
@@ -131,7 +149,11 @@ def measure_delays(
             f"the paddle was seen in only {len(good)} of {trials} trials; check the "
             "light, its colour in the rig, and what hides it"
         )
-    return Delays(good[:, 0], good[:, 1] - good[:, 0])
+    return Delays(good[:, 0], good[:, 1] - good[:, 0], *frame_times(frames))
+
+
+def _without_image(frame: CameraFrame) -> CameraFrame:
+    return frame._replace(image=np.zeros(0, np.uint8))
 
 
 def _sway(now: float) -> tuple[Array, Array]:

@@ -16,7 +16,6 @@ import numpy as np
 
 from marl_airhockey.hardware.camera import Camera, CameraFrame, open_source
 from marl_airhockey.hardware.hand_rig import HandRig
-from marl_airhockey.hardware.lab.camera import PADDLE_TOP
 from marl_airhockey.hardware.lab.hand_camera import FIELD, hand_tag_places, hand_view
 from marl_airhockey.hardware.lab.lab import Lab, LabClient, served
 from marl_airhockey.hardware.lab.table_camera import lab_view, tag_places
@@ -28,6 +27,7 @@ from marl_airhockey.hardware.vision.calibration import (
     tag_corners,
     view_from_tags,
 )
+from marl_airhockey.sim.contracts.camera_model import PADDLE_TOP
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.sim.jit.folders import cache_folder
@@ -86,6 +86,7 @@ def calibrate_lab(client: LabClient) -> Rig:
         puck_marked=info["marked"],
         block=block,
         paddle=Colour.around(image, (float(u), float(v)), REACH),
+        period=1.0 / info["frame_rate"],
         robot=info["host"],
         mounting=fit_mounting(*(np.array(x) for x in touched)),
         tags={str(k): four.tolist() for k, four in known.items()},

@@ -15,20 +15,16 @@ import numpy as np
 from marl_airhockey.hardware.lab.drawing import enlarged, through_lens
 from marl_airhockey.hardware.vision.boards import SQUARE, SQUARES, make_board
 from marl_airhockey.hardware.vision.lens import CameraView
+from marl_airhockey.sim.contracts.camera_model import FLOOR
 from marl_airhockey.types import Array
 
 CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 49)[:-1]) for f in (np.cos, np.sin)], 1)
-FELT, FLOOR, LINES = (222, 226, 224), (70, 75, 70), (205, 190, 180)
-PADDLE = (70, 165, 60)
-"""Colours: blue, green, red."""
 NOISE = 4.0
 """Standard deviation of a pixel's noise."""
 NOISES = 6
 """Number of different noise images."""
 SHADOW = np.array([0.004, -0.006])
 """Offset (2,) of the shadow of a body about 1 cm high, m."""
-PADDLE_TOP = 0.06
-"""Height of a paddle's top, m."""
 AROUND = 24
 """Margin around moving objects that is drawn in each frame, px."""
 
@@ -98,7 +94,7 @@ class LabCamera(ABC, Generic[What]):
         across = np.mgrid[0:height, 0:width][1]
         light = (1 - 0.25 * ((across - 200) / width) ** 2)[..., None]
         flat = enlarged(view)
-        drawn = np.full((*flat.lens.size[::-1], 3), FLOOR, np.uint8)
+        drawn = np.full((*flat.lens.size[::-1], 3), FLOOR[::-1], np.uint8)
         self._draw_still(drawn, flat)
         still = through_lens(view, drawn).round().astype(np.uint8)
         scene = still * light
@@ -127,7 +123,7 @@ class LabCamera(ABC, Generic[What]):
         drawn = make_board().generateImage((700, 500))
         ends = np.array([(0, 0), (700, 0), (700, 500), (0, 500)], np.float32) - 0.5
         warp = cv2.getPerspectiveTransform(ends, pixels[:, 0].astype(np.float32))
-        scene = np.full((flat.lens.size[1], flat.lens.size[0], 3), FLOOR, np.uint8)
+        scene = np.full((*flat.lens.size[::-1], 3), FLOOR[::-1], np.uint8)
         shape = flat.lens.size
         sheet = cv2.warpPerspective(drawn, warp, shape, flags=cv2.INTER_AREA)
         inside = cv2.warpPerspective(np.full_like(drawn, 255), warp, shape)

@@ -45,10 +45,10 @@ def through_lens(view: CameraView, scene: Array) -> Array:
 
 
 def draw_polygon(image: Array, pixels: Array, colour: tuple[int, int, int]) -> None:
-    """Fill a convex polygon (n, 2), px."""
+    """Fill a convex polygon (n, 2), px, in a frame with a colour in RGB."""
     # OpenCV paints pixels on the edge completely, so move every edge inward by 0.5 px.
     corners = np.round(_inset(pixels, 0.5) * 2**SHIFT).astype(np.int32)
-    cv2.fillPoly(image, [corners], colour, cv2.LINE_AA, SHIFT)
+    cv2.fillPoly(image, [corners], colour[::-1], cv2.LINE_AA, SHIFT)
 
 
 def _inset(corners: Array, distance: float) -> Array:
@@ -77,7 +77,7 @@ def fill(
         view: View of the whole image.
         corners: Corners (n, 2), table frame, m.
         height: Height above the table, m.
-        colour: Colour as (blue, green, red).
+        colour: Colour in RGB.
         corner: Upper left pixel (x, y) of ``image`` in the whole image.
     """
     points = np.column_stack([corners, np.full(len(corners), height)])

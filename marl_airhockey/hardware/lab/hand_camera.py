@@ -9,22 +9,20 @@ import numpy as np
 
 from marl_airhockey.hardware.lab.camera import (
     CIRCLE,
-    FELT,
-    PADDLE,
-    PADDLE_TOP,
     SHADOW,
     LabCamera,
 )
 from marl_airhockey.hardware.lab.drawing import draw_polygon, fill, paste_tag, shade
 from marl_airhockey.hardware.vision.lens import CameraView, Lens
+from marl_airhockey.sim.contracts.camera_model import FELT, PADDLE, PADDLE_TOP
 from marl_airhockey.types import Array
 
 FIELD = (0.5, 0.6)
 """Length and width of the field, m."""
 RADIUS = 0.047625
 """Radius of the paddle, m."""
-SKIN = (120, 150, 205)
-"""Colour: blue, green, red."""
+SKIN = (205, 150, 120)
+"""Colour in RGB."""
 RIM = 0.07
 """Distance of the tags' centres from the field's edge, m."""
 HAND_HEIGHTS = np.array([0.10, 0.10, 0.14, 0.14])

@@ -134,6 +134,7 @@ class Lab:
             "table": self.setup.table,
             "marked": self.setup.marked,
             "block": self.setup.block,
+            "frame_rate": self._frame_rate,
             "pids": [process.pid for process in self._processes],
         }
 

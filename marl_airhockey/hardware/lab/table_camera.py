@@ -9,41 +9,43 @@ import numpy as np
 
 from marl_airhockey.hardware.lab.camera import (
     CIRCLE,
-    FELT,
-    LINES,
-    PADDLE,
-    PADDLE_TOP,
     SHADOW,
     LabCamera,
 )
 from marl_airhockey.hardware.lab.drawing import draw_polygon, fill, paste_tag, shade
 from marl_airhockey.hardware.vision.lens import CameraView, Lens
 from marl_airhockey.hardware.vision.mark import LENGTH, WIDTH
+from marl_airhockey.sim.contracts.camera_model import (
+    ARM,
+    BLOCK,
+    FELT,
+    LINE,
+    LINES,
+    PADDLE,
+    PADDLE_TOP,
+    PUCK,
+    PUCK_TOP,
+    RING,
+    lab_camera,
+)
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.table import Table
+from marl_airhockey.sim.sensing.images.photograph import link
 from marl_airhockey.types import Array
 
-PUCK, ARM, MARK, BLOCK = (42, 40, 205), (96, 92, 90), (25, 25, 25), (190, 90, 30)
-"""Colours: blue, green, red."""
+MARK = (25, 25, 25)
+"""Colour of the mark on a puck."""
 TAGS_BESIDE = 0.075
 """Distance of the tags' centres from the table's edge, m."""
-PUCK_HEIGHT = 0.003
-"""Height of the rim of a puck or a block, m."""
-ARM_HEIGHTS = np.array([0.10, 0.10, 0.35, 0.35])
-"""Heights of the corners of the arm's last link above the table, m."""
 
 
 def lab_view(table: Table) -> CameraView:
     """Return the true view of the lab's camera above its table."""
-    focal = 602.0 * 1.9304 / max(table.size[0], 1.2)
-    matrix = ((focal, 0.0, 322.0), (0.0, focal, 243.0), (0.0, 0.0, 1.0))
-    lens = Lens(matrix, (-0.10, 0.04, 0.0, 0.0, 0.0), (640, 480))
-    rotation, _ = cv2.Rodrigues(np.array([np.pi + 0.06, 0.03, 0.02]))
-    vector, _ = cv2.Rodrigues(rotation)
-    centre = np.array([-0.03, 0.05, 2.15])
+    model = lab_camera(table)
+    lens = Lens(model.matrix, model.distortion, model.size)
+    vector, _ = cv2.Rodrigues(np.array(model.rotation))
     x, y, z = (float(v) for v in vector[:, 0])
-    tx, ty, tz = (float(v) for v in -rotation @ centre)
-    return CameraView(lens, (x, y, z), (tx, ty, tz))
+    return CameraView(lens, (x, y, z), model.translation)
 
 
 def tag_places(table: Table) -> dict[int, Array]:
@@ -103,10 +105,11 @@ class TableCamera(LabCamera[Seen]):
 
     def _draw_still(self, scene: Array, view: CameraView) -> None:
         fill(scene, view, np.asarray(self._table.vertices), 0.0, FELT)
-        fill(scene, view, 0.12 * CIRCLE, 0.0, LINES)
-        fill(scene, view, 0.115 * CIRCLE, 0.0, FELT)
+        inner, outer = RING
+        fill(scene, view, outer * CIRCLE, 0.0, LINES)
+        fill(scene, view, inner * CIRCLE, 0.0, FELT)
         y = float(self._table.size[1]) / 2
-        middle = np.array([(-0.003, -y), (0.003, -y), (0.003, y), (-0.003, y)])
+        middle = np.array([(-LINE, -y), (LINE, -y), (LINE, y), (-LINE, y)])
         fill(scene, view, middle, 0.0, LINES)
         for number, centre in tag_places(self._table).items():
             paste_tag(scene, view, number, centre)
@@ -124,22 +127,19 @@ class TableCamera(LabCamera[Seen]):
         for at, wide, colour in discs:
             if at is not None:
                 shade(part, view, at + SHADOW + wide * CIRCLE, corner)
-                fill(part, view, at + wide * CIRCLE, PUCK_HEIGHT, colour, corner)
+                fill(part, view, at + wide * CIRCLE, PUCK_TOP, colour, corner)
         if moved is not None and self._marked:
             bar = moved + _bar(radius, seen.puck_angle + later * seen.puck_spin)
-            fill(part, view, bar, PUCK_HEIGHT, MARK, corner)
+            fill(part, view, bar, PUCK_TOP, MARK, corner)
         size = self._table.paddle_radius
         shade(part, view, paddle + 4 * SHADOW + size * CIRCLE, corner)
         fill(part, view, paddle + size * CIRCLE, PADDLE_TOP, PADDLE, corner)
-        corners = _link(paddle, self._base)
-        pixels = view.project(np.column_stack([corners, ARM_HEIGHTS]))
-        draw_polygon(part, pixels - corner, ARM)
+        draw_polygon(part, view.project(_link(paddle, self._base)) - corner, ARM)
 
     def _outlines(self, seen: Seen) -> list[Array]:
         table = self._table
-        link = _link(seen.paddle, self._base)
         found = [
-            self.view.project(np.column_stack([link, ARM_HEIGHTS])),
+            self.view.project(_link(seen.paddle, self._base)),
             self._disc(seen.paddle, table.paddle_radius),
         ]
         block = None if seen.block is None else seen.block[0]
@@ -163,16 +163,12 @@ def _bar(radius: float, angle: float) -> Array:
 
 
 def _link(paddle: Array, base: Array) -> Array:
-    """Return the corners (4, 2) of the arm's last link, table frame, m.
+    """Return the corners (4, 3) of the arm's last link, table frame, m.
 
     Args:
         paddle: Position (2,) of the paddle, m.
         base: Position (2,) of the arm's base, m.
     """
-    along = base - paddle
-    along = along / np.linalg.norm(along)
-    aside = np.array([-along[1], along[0]])
-    far = paddle + 0.45 * along
-    near = paddle - 0.02 * along
-    wide, narrow = 0.06 * aside, 0.035 * aside
-    return np.stack([near + narrow, near - narrow, far - wide, far + wide])
+    corners = np.zeros((4, 3))
+    link(paddle[0], paddle[1], base, corners)
+    return corners

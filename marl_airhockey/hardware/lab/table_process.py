@@ -17,7 +17,7 @@ from marl_airhockey.hardware.lab.frame_server import FrameServer
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.lab.table_camera import Seen, TableCamera, lab_view
 from marl_airhockey.hardware.lab.world import RATE, LabWorld
-from marl_airhockey.hardware.robot.nominal import BEHIND
+from marl_airhockey.sim.contracts.camera_model import BEHIND
 
 LATE = 0.25
 """Largest lag of the loop, s; after a larger one, missed steps are skipped."""

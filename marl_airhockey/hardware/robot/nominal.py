@@ -6,11 +6,10 @@ import numpy as np
 
 from marl_airhockey.hardware.robot.kinematics import vector_of
 from marl_airhockey.hardware.robot.mounting import Mounting
+from marl_airhockey.sim.contracts.camera_model import BEHIND
 from marl_airhockey.sim.core.seat import Seat, make_seat
 from marl_airhockey.sim.core.table import TABLES, Table
 
-BEHIND = 0.22
-"""Distance of the arm's base from the table's edge, m."""
 BELOW = 0.02
 """Height of the table's edge above the base, m."""
 TILT = 5.5

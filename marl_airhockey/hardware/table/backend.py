@@ -15,12 +15,14 @@ from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot import Robot, RobotError
 from marl_airhockey.hardware.table.block_tracker import BlockTracker
 from marl_airhockey.hardware.table.devices import TableDevices
-from marl_airhockey.hardware.table.overlay import scaled
+from marl_airhockey.hardware.table.overlay import cropped, scaled
 from marl_airhockey.hardware.table.placing import Placing
+from marl_airhockey.hardware.table.report import device_report
 from marl_airhockey.hardware.table.tracker import Tracker
-from marl_airhockey.hardware.table.troubles import robot_trouble, trouble_of
+from marl_airhockey.hardware.table.troubles import trouble_of
 from marl_airhockey.hardware.vision.rectifier import Rectifier
 from marl_airhockey.sim.contracts.backend import Command, LiveBackend
+from marl_airhockey.sim.contracts.camera_model import CameraModel
 from marl_airhockey.sim.contracts.mark import Mark
 from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.scene import Scene
@@ -249,50 +251,42 @@ class RealBackend(LiveBackend):
     def sight(self) -> Array:
         return self._tracker.sight(self._devices.watcher.looked_at)
 
+    @property
+    def camera_model(self) -> CameraModel:
+        return self.rig.camera_model
+
+    def frame(self, size: int) -> Array:
+        window = self.camera_model.window(self.scene.table)
+        return cropped(self._image, window, size)[..., ::-1]
+
+    @property
+    def _image(self) -> Array:
+        """Newest image of the camera (H, W, 3) uint8, blue, green, red."""
+        frame = self.camera.newest
+        if frame is None:
+            raise RuntimeError(self.camera.trouble or "camera: no frame yet")
+        return frame.image
+
     def telemetry(self) -> dict[str, Any]:
-        status, camera, last = (
-            self.robot.get_observation(),
-            self.camera,
-            self._tracker.last,
-        )
         return {
             "moment": self._moment,
             **dict(zip(("captured", "received"), self._frame, strict=True)),
-            "applied": status.applied_at,
-            "robot": self.robot.state.name,
-            "fault": self.robot.fault.label,
-            "trouble": robot_trouble(self.robot),
             "asked": [round(float(x), 4) for x in self._commanded],
-            "sent": [round(status.sent_vx, 4), round(status.sent_vy, 4)],
-            "sent_position": [round(status.sent_x, 4), round(status.sent_y, 4)],
-            "height_mm": round(1e3 * status.z, 2),
-            "force": round(status.force, 1),
-            "joints": [round(angle, 5) for angle in status.joints],
-            "cycles": int(status.cycles),
-            "late": int(status.late),
-            "refused": int(status.refused),
             "overruns": self._overruns,
-            "camera": camera.trouble,
-            "frame_ms": round(1e3 * min(camera.age, 99.0), 1),
-            "dropped": camera.dropped,
-            "puck_ms": round(1e3 * (time.monotonic() - last.time), 1) if last else None,
-            "noise_mm": round(1e3 * self._tracker.noise, 2),
+            **device_report(self._devices, self._tracker),
         }
 
     def photograph(
         self, world: int, viewpoint: str, marks: Sequence[Mark], width: int
     ) -> Array:
-        frame = self.camera.newest
-        if frame is None:
-            raise RuntimeError(self.camera.trouble or "camera: no frame yet")
         if viewpoint == "rectified":
-            return self.rectifier.rectify(frame.image, width)[..., ::-1]
+            return self.rectifier.rectify(self._image, width)[..., ::-1]
         if viewpoint == "camera":
-            return scaled(frame.image, width)[..., ::-1]
+            return scaled(self._image, width)[..., ::-1]
         status = self.robot.get_observation()
         paddle = np.array([status.x, status.y])
         bodies = paddle, self._tracker.estimate, self._block.position
-        return self._devices.overlay.draw(frame.image, *bodies, marks, width)
+        return self._devices.overlay.draw(self._image, *bodies, marks, width)
 
     def close(self) -> None:
         self._devices.close()

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from marl_airhockey.hardware.vision.lens import CameraView
+from marl_airhockey.sim.contracts.camera_model import FrameWindow
 from marl_airhockey.sim.contracts.mark import Mark, Meaning
 from marl_airhockey.sim.contracts.palette import LIGHT, SEATS, rgb
 from marl_airhockey.sim.core.scene import Scene
@@ -95,3 +96,20 @@ def scaled(image: Array, width: int) -> Array:
         return image
     height = round(width * image.shape[0] / image.shape[1])
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA))
+
+
+def cropped(image: Array, window: FrameWindow, size: int) -> Array:
+    """Return a window of a frame (H, W, 3) as an image (size, size, 3) uint8.
+
+    It is black beyond the edge of the frame.
+    """
+    high, wide = image.shape[:2]
+    square = np.zeros((window.side, window.side, 3), np.uint8)
+    top, left = max(window.top, 0), max(window.left, 0)
+    bottom, right = (
+        min(window.top + window.side, high),
+        min(window.left + window.side, wide),
+    )
+    y, x = top - window.top, left - window.left
+    square[y : y + bottom - top, x : x + right - left] = image[top:bottom, left:right]
+    return np.asarray(cv2.resize(square, (size, size), interpolation=cv2.INTER_AREA))

@@ -16,6 +16,8 @@ HUES = 180
 PALE, DARK = 60, 0.8
 """Least saturation of a coloured pixel, 0 .. 255, and least brightness, as a share of
 the median of its surroundings."""
+MARGIN = 0.6
+"""Least saturation and brightness of a range, as a share of those of the object."""
 FAINT = 0.2
 """Share of the largest amount of a colour below which a pixel does not count."""
 
@@ -42,6 +44,15 @@ class Colour:
         check_fields(
             self, hue=(0, HUES), width=(0, HUES), saturation=byte, brightness=byte
         )
+
+    @property
+    def rgb(self) -> tuple[int, int, int]:
+        """Typical colour of the range as red, green and blue, 0 .. 255."""
+        levels = self.saturation, self.brightness
+        s, v = (min(level / MARGIN, 255.0) for level in levels)
+        pixel = np.array([[[round(self.hue) % HUES, s, v]]], np.uint8)
+        red, green, blue = cv2.cvtColor(pixel, cv2.COLOR_HSV2RGB)[0, 0].tolist()
+        return red, green, blue
 
     def mask(self, image: Array) -> Array:
         """Return a mask (H, W) uint8, 255 where an image (H, W, 3) has this colour."""
@@ -116,5 +127,5 @@ class Colour:
         saturation, brightness = np.percentile(hsv[:, 1:], 5, axis=0)
         off = np.abs((hsv[:, 0] - mean + HUES / 2) % HUES - HUES / 2)
         width = max(float(np.percentile(off, 95)) + 4.0, 6.0)
-        least = (max(int(0.6 * saturation), 40), max(int(0.6 * brightness), 30))
+        least = (max(int(MARGIN * saturation), 40), max(int(MARGIN * brightness), 30))
         return Colour(round(float(mean), 1), round(width, 1), *least)

@@ -76,6 +76,11 @@ class CameraView:
         matrix = cv2.Rodrigues(np.array(self.rotation, float))[0]
         return matrix, np.array(self.translation, float)
 
+    @property
+    def matrix(self) -> Array:
+        """Rotation (3, 3) from the table frame to the camera frame."""
+        return self._pose[0]
+
     @cached_property
     def centre(self) -> Array:
         """Position (3,) of the camera, table frame, m."""

@@ -1,4 +1,4 @@
-"""Behaviour cloning from pixels, with the same images as ``observe="pixels"``.
+"""Behaviour cloning from images, those of ``observe="pixels"`` or ``"camera"``.
 
 Recordings are replayed, and images are rendered when their steps are sampled. The
 policy is saved as an ONNX model.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -32,9 +32,15 @@ from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.policies.policy import Policy
 from marl_airhockey.rollouts.replay import Replay
 from marl_airhockey.sim.contracts.driver import Driver
-from marl_airhockey.sim.contracts.image_form import image_form
+from marl_airhockey.sim.contracts.image_form import (
+    OWN_SIZE,
+    PIXELS,
+    image_form,
+    shows_camera,
+)
 from marl_airhockey.sim.core.recording import Recording
 from marl_airhockey.sim.sensing.images.images import Moving, TableImages
+from marl_airhockey.sim.world.observation import Observation
 from marl_airhockey.types import Array
 
 REPORT = 100
@@ -52,15 +58,24 @@ class PixelSteps(NamedTuple):
     seat: int
     """Index of the seat."""
 
-    def sample(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-        """Return images (n, H, W, channels) uint8 and actions (n, 2) of some steps."""
+    def sample(self, rng: np.random.Generator, count: int) -> tuple[Observation, Array]:
+        """Return observations (n, ...) and actions (n, 2) of random steps."""
         return self.at(rng.integers(len(self.action), size=count))
 
-    def at(self, rows: Array) -> tuple[Array, Array]:
-        """Return images and actions of steps, by index (n,)."""
+    def at(self, rows: Array) -> tuple[Observation, Array]:
+        """Return observations and actions of steps, by index (n,)."""
         moving = Moving(*(part[rows] for part in self.moving))
-        seats = np.array([self.seat])
-        return self.images.draw(moving, seats)[:, 0], self.action[rows]
+        drawn = self.images.draw(moving, np.array([self.seat]))
+        if isinstance(drawn, np.ndarray):
+            return drawn[:, 0], self.action[rows]
+        return {name: part[:, 0] for name, part in drawn.items()}, self.action[rows]
+
+
+def augmented(seen: Observation, most: int, rng: np.random.Generator) -> Observation:
+    """Return observations whose images are `shifted`."""
+    if isinstance(seen, np.ndarray):
+        return shifted(seen, most, rng)
+    return {**seen, PIXELS: shifted(seen[PIXELS], most, rng)}
 
 
 def shifted(images: Array, most: int, rng: np.random.Generator) -> Array:
@@ -110,9 +125,9 @@ def recorded_steps(
             images = replay.world.observer.images[observe]
             moving += steps_of(replay, observe)
             actions += [e.columns["action"][:, seat] for e in batch]
-    parts = (np.concatenate(part) for part in zip(*moving, strict=True))
+    every = Moving(*map(np.concatenate, zip(*moving, strict=True)))
     action = np.concatenate(actions).astype(np.float32).clip(-1, 1)
-    return PixelSteps(images, Moving(*parts), action, seat)
+    return PixelSteps(images, every, action, seat)
 
 
 def steps_of(replay: Replay, observe: str) -> list[Moving]:
@@ -125,7 +140,7 @@ def steps_of(replay: Replay, observe: str) -> list[Moving]:
         moving = observer.images[observe].collect(*shown)
         steps.append(Moving(*(part.copy() for part in moving)))
         replay.step(t)
-    every = [np.stack(part, 1) for part in zip(*steps, strict=True)]
+    every = Moving(*(np.stack(part, 1) for part in zip(*steps, strict=True)))
     return [
         Moving(*(part[b, :length] for part in every))
         for b, length in enumerate(replay.lengths)
@@ -150,7 +165,8 @@ class PixelCloning:
         self._rng = np.random.default_rng([config.seed, run.progress.steps])
         torch.manual_seed(config.seed)
         shape = image_form(config.observe).shape
-        actor = ImageActor(shape, config.network, config.hidden)
+        own = OWN_SIZE if shows_camera(config.observe) else 0
+        actor = ImageActor(shape, config.network, config.hidden, own)
         self.model = actor.to(self._device)
         self._optimizer = torch.optim.Adam(self.model.parameters(), fused=True)
         if run.progress.steps:
@@ -181,15 +197,13 @@ class PixelCloning:
 
     def _descend(self, step: int) -> float:
         """Make one gradient step on a minibatch; return the loss."""
-        images, actions = self._data.sample(self._rng, self._config.batch_size)
+        seen, actions = self._data.sample(self._rng, self._config.batch_size)
         if self._config.shift:
-            images = shifted(images, self._config.shift, self._rng)
-        pictures, action = (
-            torch.from_numpy(x).to(self._device) for x in (images, actions)
-        )
+            seen = augmented(seen, self._config.shift, self._rng)
+        action = torch.from_numpy(actions).to(self._device)
         for group in self._optimizer.param_groups:
             group["lr"] = self._config.rate(step)
-        loss = (self.model(pictures.float()) - action).square().sum(-1).mean()
+        loss: Any = (self.model.at(seen) - action).square().sum(-1).mean()
         self._optimizer.zero_grad(set_to_none=True)
         loss.backward()
         self._optimizer.step()
@@ -202,7 +216,8 @@ class PixelCloning:
         card = {**config.card([]), "algo": config.algo}
         card["steps"] = self._run.progress.steps
         path = folder / f"{name}.onnx"
-        save_image_policy(self.model.layers, self.model.shape, card, path)
+        parts = self.model.features, self.model.head, self.model.shape
+        save_image_policy(*parts, card, path)
 
 
 def clone_from_pixels(run: TrainingRun[OfflineConfig]) -> Metrics:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from marl_airhockey.sim.contracts.camera_model import CameraModel
 from marl_airhockey.sim.contracts.mark import Mark
 from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.scene import Scene
@@ -248,6 +249,25 @@ class LiveBackend(Backend):
         """Return the pucks in the newest frame (B, pucks, 4).
 
         The columns are x and y, m, visibility, and age, s.
+        """
+
+    @property
+    @abstractmethod
+    def camera_model(self) -> CameraModel:
+        """Model of the camera above the table."""
+
+    @abstractmethod
+    def frame(self, size: int) -> Array:
+        """Return the newest frame in the window of the model.
+
+        Args:
+            size: Width and height of the result, px.
+
+        Returns:
+            Image (size, size, 3) uint8, RGB; black beyond the edge of the frame.
+
+        Raises:
+            RuntimeError: There is no frame. The message gives the reason.
         """
 
     @abstractmethod

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 
 from marl_airhockey.sim.contracts.observable import OBSERVE
 from marl_airhockey.sim.core.errors import unknown_name
 
-IMAGES = "pixels"
-"""Observation type of images with the default settings."""
+IMAGES, CAMERA = "pixels", "camera"
+"""Observation types of images with the default settings: drawn tables, and the frames
+of a camera."""
+PIXELS, OWN = "pixels", "agent_pos"
+"""Entries of an observation of a camera: frames, and the state of the own paddle."""
+OWN_SIZE = 4
+"""Number of elements of this state: position, m, and velocity, m/s."""
 CHANNELS = {"grey": 1, "rgb": 3}
 """Number of channels of a frame by colour."""
 SIZES, STACKS = range(36, 257), range(1, 9)
@@ -53,9 +58,37 @@ class ImageForm:
         return self.size, self.size, self.frames * self.channels
 
 
+@dataclass(frozen=True)
+class CameraForm(ImageForm):
+    """Settings of the frames of a camera, as in ``camera:rig=rig.json,size=84``.
+
+    Raises:
+        ValueError: A setting is not allowed.
+    """
+
+    rig: str = ""
+    """File that describes the camera of a table; "" for the camera of the virtual
+    lab."""
+
+
+FORMS = {IMAGES: ImageForm, CAMERA: CameraForm}
+"""Settings of each observation type that has images."""
+
+
 def shows_images(observe: str | None) -> bool:
-    """Return True if an observation type consists of images."""
-    return observe is not None and observe.partition(":")[0] == IMAGES
+    """Return True if an observation type has images."""
+    return observe is not None and observe.partition(":")[0] in FORMS
+
+
+def shows_camera(observe: str | None) -> bool:
+    """Return True if an observation type has the frames of a camera."""
+    return observe is not None and observe.partition(":")[0] == CAMERA
+
+
+def kind_of_images(observe: str) -> ImageForm | None:
+    """Return the settings of images that matter to a policy; None without images."""
+    form = image_form(observe) if shows_images(observe) else None
+    return replace(form, rig="") if isinstance(form, CameraForm) else form
 
 
 def check_forms(forms: Iterable[str]) -> None:
@@ -76,8 +109,9 @@ def image_form(observe: str) -> ImageForm:
     Raises:
         ValueError: A setting is unknown or not allowed.
     """
-    _, colon, tail = observe.partition(":")
-    known = {f.name: str(f.type) for f in fields(ImageForm)}
+    head, colon, tail = observe.partition(":")
+    kind = FORMS[head]
+    known = {f.name: str(f.type) for f in fields(kind)}
     found: dict[str, int | str] = {}
     for part in tail.split(",") if colon else ():
         name, _, value = (text.strip() for text in part.partition("="))
@@ -94,6 +128,6 @@ def image_form(observe: str) -> ImageForm:
                 f"observe: {observe!r}: {name} must be a whole number"
             ) from None
     try:
-        return ImageForm(**found)  # type: ignore[arg-type]
+        return kind(**found)  # type: ignore[arg-type]
     except ValueError as error:
         raise ValueError(f"observe: {observe!r}: {error}") from error

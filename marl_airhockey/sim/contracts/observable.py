@@ -19,14 +19,15 @@ from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array, Memory
 
-OBSERVE = ("velocity", "estimate", "history", "pixels")
+OBSERVE = ("velocity", "estimate", "history", "pixels", "camera")
 """Observation types of pucks.
 
 ``velocity``: the sensed position and velocity. ``estimate``: position and velocity for
 now, estimated by a filter with a model of the table. ``history``: the last sensed
 positions, each with a visibility flag and the age of its frame, as from a camera.
-``pixels``: images. Settings may follow, as in ``pixels:size=64,colour=rgb,frames=1``,
-see `image_form.ImageForm`."""
+``pixels``: drawn images of the table. Settings may follow, as in
+``pixels:size=64,colour=rgb,frames=1``, see `image_form.ImageForm`. ``camera``: frames
+of a camera, with the state of the own paddle, see `image_form.CameraForm`."""
 
 
 HISTORY = 5

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from marl_airhockey.sim.contracts.image_form import image_form, shows_images
+from marl_airhockey.sim.contracts.backend import LiveBackend
+from marl_airhockey.sim.contracts.camera_model import CameraModel
+from marl_airhockey.sim.contracts.image_form import (
+    image_form,
+    shows_camera,
+    shows_images,
+)
 from marl_airhockey.sim.contracts.observable import HISTORY, PENDING
 from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.rng import StreamSet
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.sensing.photos import Photos, SimulatedPhotos, TablePhotos
 from marl_airhockey.sim.sensing.simulated_camera import SENSED, SimulatedCamera
 from marl_airhockey.types import ALL, Array, Rows
 
@@ -25,7 +32,7 @@ class Needs(NamedTuple):
     estimate: bool
     """True to estimate the pucks for now by a filter."""
     frames: int = 0
-    """Number of sensed positions of all bodies to store, for images."""
+    """Number of sensed positions of all bodies to store, for drawn images."""
 
     @staticmethod
     def of(forms: Iterable[str]) -> Needs:
@@ -35,7 +42,8 @@ class Needs(NamedTuple):
             forms: Names of the observation types.
         """
         forms = set(forms)
-        frames = [image_form(f).frames for f in forms if shows_images(f)]
+        drawn = [f for f in forms if shows_images(f) and not shows_camera(f)]
+        frames = [image_form(f).frames for f in drawn]
         history = bool(forms - {"velocity"})
         return Needs(history, "estimate" in forms, max(frames, default=0))
 
@@ -49,8 +57,8 @@ class Sensor:
         physics: Ranges of the parameters of sensing.
         control_dt: Length of a control step, s.
         needs: Requirements of the observation types.
-        sight: Function that returns the newest measurement of a real table, see
-            `LiveBackend.sight`; None for simulated sensing.
+        live: Backend of a real table; None for simulated sensing.
+        cameras: Cameras of the observation types that show one.
     """
 
     def __init__(
@@ -60,12 +68,13 @@ class Sensor:
         physics: Physics,
         control_dt: float,
         needs: Needs,
-        sight: Callable[[], Array] | None = None,
+        live: LiveBackend | None = None,
+        cameras: Mapping[str, CameraModel] | None = None,
     ) -> None:
-        self.control_dt, self._sight, self._keeps = control_dt, sight, needs.history
+        self.control_dt, self._live, self._keeps = control_dt, live, needs.history
         self.camera: SimulatedCamera | None = None
         """Simulated camera; None if the states themselves are observed."""
-        if sight is None and physics.any_of(*SENSED):
+        if live is None and physics.any_of(*SENSED):
             simulated = scene, num_worlds, physics, control_dt, needs.estimate
             self.camera = SimulatedCamera(*simulated)
         pucks, b = scene.bodies.pucks, num_worlds
@@ -76,6 +85,15 @@ class Sensor:
         """Age of the simulated camera's newest frame of each puck (B, pucks), s."""
         self.frames = np.zeros((b, needs.frames, len(scene.bodies), 3))
         """Sensed positions, m, and angles of all bodies (B, F, N, 3), newest last."""
+        self.photos: dict[str, Photos] = {}
+        """Frames of each camera that an observation type shows."""
+        for form, camera in (cameras or {}).items():
+            size, count = image_form(form).size, image_form(form).frames
+            self.photos[form] = (
+                SimulatedPhotos(camera, scene, b, count, control_dt)
+                if live is None
+                else TablePhotos(live.frame, size, count)
+            )
         self.requested = np.zeros((b, PENDING, scene.bodies.paddles, 2))
         """Last requested actions (B, PENDING, seats, 2), ego frames, newest last."""
 
@@ -135,7 +153,9 @@ class Sensor:
         """
         if self.camera is not None:
             self.camera.reset(worlds, state, values)
-        sensed = self.sense(state, values, streams, worlds)
+        sensed = self._sense(state, values, streams, worlds)
+        for photos in self.photos.values():
+            photos.restart(state, streams, worlds)
         if self._keeps:
             self.history[worlds] = self.history[worlds][:, -1:]
             self.frames[worlds] = self.frames[worlds][:, -1:]
@@ -149,6 +169,17 @@ class Sensor:
         rows: Rows = ALL,
     ) -> State:
         """Return the sensed state. Time has passed only in the worlds ``rows``."""
+        for photos in self.photos.values():
+            photos.take(state, streams, rows)
+        return self._sense(state, values, streams, rows)
+
+    def _sense(
+        self,
+        state: State,
+        values: Mapping[str, Array],
+        streams: StreamSet,
+        rows: Rows,
+    ) -> State:
         sensed = state
         if self.camera is not None:
             sensed, self.age = self.camera.look(state, values, streams, rows)
@@ -161,8 +192,8 @@ class Sensor:
 
     def _newest(self, sensed: State) -> Array:
         """Return the newest row (B, pucks, 4) of the history."""
-        if self._sight is not None:
-            return self._sight()
+        if self._live is not None:
+            return self._live.sight()
         newest = np.empty((*self.age.shape, 4))
         newest[..., :2], newest[..., 2] = sensed.puck, sensed.visible
         newest[..., 3] = self.age

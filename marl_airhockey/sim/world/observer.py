@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from marl_airhockey.sim.contracts.image_form import image_form
+from marl_airhockey.sim.contracts.camera_model import CameraModel
 from marl_airhockey.sim.contracts.observable import (
     EgoView,
     ObservationContext,
@@ -20,7 +20,7 @@ from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.jit.fused import Fused, Sink, Source
 from marl_airhockey.sim.jit.pipeline import Stage
-from marl_airhockey.sim.sensing.images.images import TableImages
+from marl_airhockey.sim.sensing.images.camera_images import images_of
 from marl_airhockey.sim.sensing.reaction import Parts, ReactionDelay, whole_steps
 from marl_airhockey.sim.sensing.sensor import Sensor
 from marl_airhockey.sim.world.hidden_pucks import HiddenPucks
@@ -45,6 +45,7 @@ class Observer:
         physics: Ranges of the physics parameters, for the top speed.
         forms: Observation types that can be read, see `observable.OBSERVE`. The first
             one is the type of the open seats.
+        cameras: Cameras of the types that show one.
 
     Raises:
         ValueError: An observation type is unknown, its images need too much memory, or
@@ -57,6 +58,7 @@ class Observer:
         sensor: Sensor,
         physics: Physics,
         forms: Collection[str],
+        cameras: Mapping[str, CameraModel],
     ) -> None:
         self.scenario, self.sensor, self.forms = scenario, sensor, tuple(forms)
         self.observe = self.forms[0]
@@ -69,7 +71,7 @@ class Observer:
         """Latency of observations by the rules of the game, s."""
         self.direct = self.observe == "velocity" and sensor.ideal and not self._delay
         """True if open seats observe the true state, so that `stage` fills it in."""
-        self.images = TableImages.of(scenario, forms, len(sensor.frames))
+        self.images = images_of(scenario, forms, len(sensor.frames), cameras)
         """Images by observation type."""
         self._layouts: dict[str, ObservationLayout] = {}
         self._fused: dict[str, Fused] = {}
@@ -212,8 +214,7 @@ class Observer:
                 the sensed ones, table frame; None for the sensed ones. Histories and
                 images are always the sensed ones.
         """
-        form = form or self.observe
-        self.layout_of(form)
+        self.layout_of(form := form or self.observe)
         if form in self.images:
             shown = self.pictured(sensed, memory, form)
             return self.images[form].read(*shown, seats, worlds)
@@ -240,10 +241,9 @@ class Observer:
             form: Observation type; None for the type of the open seats.
             rows: Number of rows.
         """
-        form = form or self.observe
-        layout = self.layout_of(form)
+        layout = self.layout_of(form := form or self.observe)
         if form in self.images:
-            return np.zeros((rows, *image_form(form).shape), np.uint8)
+            return self.images[form].blank(rows)
         flat, game = np.zeros((rows, len(layout.labels)), np.float32), self.scenario
         if game.goals == "flat" or not isinstance(game, GoalScenario):
             return flat
@@ -295,6 +295,6 @@ class Observer:
     ) -> tuple[Array, Source, Source]:
         """Return frames, state and memory, the arguments of `TableImages.collect`."""
         state, known, _ = self._sources(sensed, memory, form)
-        delay = self._delay
-        frames = delay.delayed("sensor")["frames"] if delay else self.sensor.frames
-        return frames, state, known
+        past = self._delay.delayed("sensor") if self._delay else vars(self.sensor)
+        photos = self.sensor.photos.get(form)
+        return past["frames"] if photos is None else photos.rows, state, known

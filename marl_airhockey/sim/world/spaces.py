@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from gymnasium import spaces
 
-from marl_airhockey.sim.contracts.image_form import image_form, shows_images
+from marl_airhockey.sim.contracts.image_form import (
+    OWN,
+    PIXELS,
+    image_form,
+    shows_camera,
+    shows_images,
+)
 from marl_airhockey.sim.contracts.scenario import GoalScenario
 from marl_airhockey.sim.world.global_state import GlobalState
 from marl_airhockey.sim.world.observer import Observer
@@ -27,7 +33,14 @@ def observation_space(observer: Observer, observe: str | None = None) -> Any:
     """Return the Box of an observation, or with goals="dict" the Dict."""
     observe = observe or observer.observe
     if shows_images(observe):
-        return spaces.Box(0, 255, image_form(observe).shape, np.uint8)
+        pixels = spaces.Box(0, 255, image_form(observe).shape, np.uint8)
+        if not shows_camera(observe):
+            return pixels
+        table, scope = observer.scenario.scene.table, observer.layout_of(observe).scope
+        reach = np.abs(table.vertices).max()
+        high = np.array([reach, reach, *[2.0 * scope.top_speed] * 2], np.float32)
+        own = spaces.Box(-high, high, dtype=np.float32)
+        return spaces.Dict({PIXELS: pixels, OWN: own})
     layout = observer.layout_of(observe)
     flat = spaces.Box(layout.low, layout.high, dtype=np.float32)
     scenario = observer.scenario

@@ -22,6 +22,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from marl_airhockey.sim.contracts.backend import Backend, LiveBackend
+from marl_airhockey.sim.contracts.camera_model import CameraModel
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.checks import check_count
@@ -30,6 +31,7 @@ from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.rng import RandomStreams, StreamSet, seeds_of
 from marl_airhockey.sim.core.seat import ReachPlanes
 from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.sensing import photos
 from marl_airhockey.sim.sensing.puck_mark import STREAM, PuckMarks
 from marl_airhockey.sim.sensing.sensor import Needs, Sensor
 from marl_airhockey.sim.world.actions import Actions
@@ -68,6 +70,7 @@ class World(WorldSpaces):
             see `observable.OBSERVE`. The first one is the type of the open seats.
         max_cycles: Length of an episode in control steps; None for the scenario's.
         autoreset: True to begin a new episode in the step in which one ended.
+        cameras: Cameras of the observation types that show one.
     """
 
     def __init__(
@@ -79,6 +82,7 @@ class World(WorldSpaces):
         forms: Collection[str] = ("velocity",),
         max_cycles: int | None = None,
         autoreset: bool = True,
+        cameras: Mapping[str, CameraModel] | None = None,
     ) -> None:
         self.scenario, self.backend, self.physics = scenario, backend, physics
         self.scene = scene = scenario.scene
@@ -92,9 +96,9 @@ class World(WorldSpaces):
         # Only once, because `isinstance` with an abstract class is slow.
         self.live = live = backend if isinstance(backend, LiveBackend) else None
         """Backend of a real table; None in simulation."""
-        sight = live.sight if live is not None else None
-        self.sensor = Sensor(scene, b, physics, dt, Needs.of(forms), sight)
-        self.observer = Observer(scenario, self.sensor, physics, forms)
+        cameras = cameras or {}
+        self.sensor = Sensor(scene, b, physics, dt, Needs.of(forms), live, cameras)
+        self.observer = Observer(scenario, self.sensor, physics, forms, cameras)
         self.driven = [
             DrivenSeat(seat, driver, self.observer, b, dt)
             for seat, driver in sorted(drivers.items())
@@ -108,13 +112,14 @@ class World(WorldSpaces):
         self._scatters = physics.any_of(*SCATTER)
         more: tuple[str, ...] = ("contact",) if self._scatters else ()
         more += (STREAM,) if PuckMarks.exist(physics) else ()
+        more += (photos.STREAM,) if cameras else ()
         self._streams = StreamSet(b, "start", "physics", "sensor", "serve", *more)
         self._episode = EpisodeCounters.empty(b, len(seats))
         self._state, self._memory = scene.still_state(b), Memory()
         self._sensed = self._best = self._judged = self._state
         self._follower = None if self.sensor.ideal else SensedMemory(scenario)
         self._step: ControlStep | None = None
-        check_elements(scenario, sight is not None)
+        check_elements(scenario, live is not None)
         self._drag = DragRegions(scenario, b) if scenario.drag_regions else None
         self.start_spread = 1.0
         """Share of the ranges, around their middles, from which starts are sampled."""

@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from marl_airhockey.hardware.calibration.delay import find_delay, measure_delays
+from marl_airhockey.hardware.calibration.delay import (
+    find_delay,
+    frame_times,
+    measure_delays,
+)
 from marl_airhockey.hardware.calibration.lab_rig import calibrate_lab
+from marl_airhockey.hardware.camera import CameraFrame
 from marl_airhockey.hardware.lab.lab import Lab, LabClient, served
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.rig import Rig
@@ -34,6 +39,16 @@ def test_the_lab_s_camera_is_as_late_as_it_was_set_up():
         found = measure_delays(rig, 8)
     assert found.camera.mean() == pytest.approx(latency, abs=0.003)
     assert 0.03 < found.arm.mean() < 0.12
+    assert found.period == pytest.approx(1 / 30, rel=0.05)
+    assert found.dropped < 0.05
+
+
+def test_missing_numbers_are_dropped_frames():
+    kept = [k for k in range(200) if k % 10 != 3]
+    frames = [CameraFrame(np.zeros(0), 5.0 + k / 60, k) for k in kept]
+    period, dropped = frame_times(frames)
+    assert period == pytest.approx(1 / 60)
+    assert dropped == pytest.approx(0.1)
 
 
 def test_a_rig_without_the_paddle_s_colour_is_refused(rig):

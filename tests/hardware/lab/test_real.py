@@ -40,6 +40,30 @@ def test_a_policy_reaches_through_camera_and_robot(rig):
     assert result.interrupted == 0
 
 
+def test_frames_of_the_table_look_like_simulated_ones(rig):
+    frames, images = "camera:colour=rgb,frames=2", []
+    world = ah.make_world("juggle", observe=frames, **keywords(rig))
+    try:
+        seen = world.reset(0)
+        for _ in range(6):
+            seen = world.step(np.array([[[0.2, 0.1]]])).observation
+        state = world.state
+        images.append(seen["pixels"][0, 0])
+        own = np.concatenate([state.paddle[0, 0], state.paddle_velocity[0, 0]])
+        np.testing.assert_allclose(seen["agent_pos"][0, 0], own, rtol=1e-5)
+    finally:
+        world.close()
+    form, options = f"{frames},rig={rig}", {"table": "full_size"}
+    simulated = ah.make_world("juggle", observe=form, options=options)
+    simulated.reset(0)
+    state.velocity[:] = 0.0
+    images.append(simulated.set_state(state)["pixels"][0, 0])
+    table, model = (image.astype(int) for image in images)
+    difference = np.abs(table - model)[..., 3:]
+    assert difference.mean() < 6.0
+    assert np.quantile(difference, 0.98) < 35.0
+
+
 @pytest.mark.slow
 def test_a_puck_is_seen_touched_and_lost_as_it_is(lab, rig):
     world = build_driven_world(

@@ -208,7 +208,8 @@ def test_bodies_without_a_position_are_not_drawn():
     world.reset(0)
     images = world.observer.images[SMALL]
     frames = np.full((1, 1, 2, 3), np.nan)
-    nothing = Moving(frames, np.zeros((1, 0, 4, 2)), np.zeros((1, 0)))
+    none = np.zeros((1, 0))
+    nothing = Moving(frames, np.zeros((1, 0, 4, 2)), none, none)
     empty = images.draw(nothing, np.array([0]))
     far = replace_frames(nothing, frames.copy())
     far.frames[:] = 1e12

@@ -1,5 +1,7 @@
 """What sensors make of the truth, against closed forms."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from situations import place_puck
@@ -216,7 +218,7 @@ def test_a_live_backend_gets_no_simulated_camera():
     measured = np.array([[[0.1, 0.2, 1.0, 0.03]]])
     sensor = Sensor(
         *(world.scene, 1, world.physics, DT, Needs.of(["history"])),
-        sight=lambda: measured,
+        live=SimpleNamespace(sight=lambda: measured),
     )
     assert sensor.ideal
     state, physics = world.state, world.episode.physics

@@ -18,6 +18,7 @@ GAMES = [
     ("juggle", {}),
     ("juggle", {"profile": "ur5e"}),
     ("juggle", {"observe": "pixels"}),
+    ("juggle", {"observe": "camera"}),
     ("hit_goal", {"goals": "dict"}),
     ("strike_crowd", {}),
     ("duel", {"drivers": {"paddle_1": "zoo/duel"}}),

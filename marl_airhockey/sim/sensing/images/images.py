@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -11,9 +11,6 @@ import numpy as np
 
 from marl_airhockey.sim.contracts.image_form import (
     ImageForm,
-    check_forms,
-    image_form,
-    shows_images,
 )
 from marl_airhockey.sim.contracts.look import (
     Shape,
@@ -50,15 +47,22 @@ COPIES = 3
 learner."""
 
 
+Images = Array | dict[str, Array]
+"""Images of seats, or a dictionary of them and other elements of observations."""
+
+
 class Moving(NamedTuple):
     """Moving parts of the images of W worlds."""
 
     frames: Array
-    """Sensed positions, table frame, m, and angles (W, F, N, 3), the newest last."""
+    """Sensed positions, table frame, m, and angles (W, F, N, 3), the newest last, or
+    frames of a camera, see `photos.Photos`."""
     points: Array
     """Points (W, n, CORNERS, 2) of marks and other shapes, table frame, m."""
     shown: Array
     """Visibility (W, n) of these shapes, 1 or 0."""
+    own: Array
+    """Other elements of the observations (W, k), float32."""
 
 
 class TableImages:
@@ -87,23 +91,6 @@ class TableImages:
         self._pool = BufferPool([((seats, *form.shape), np.uint8)])
         self._templates: Templates | None = None
 
-    @staticmethod
-    def of(
-        scenario: Scenario, forms: Iterable[str], num_worlds: int
-    ) -> dict[str, TableImages]:
-        """Return the images of the observation types that consist of images.
-
-        Raises:
-            ValueError: A type is unknown, or a setting of images is not allowed.
-        """
-        check_forms(forms)
-        shown = {form: image_form(form) for form in forms if shows_images(form)}
-        if shown and scenario.goals == "dict":
-            raise ValueError(
-                f"observe: {', '.join(shown)}: images show the goal; omit goals='dict'"
-            )
-        return {k: TableImages(scenario, f, num_worlds) for k, f in shown.items()}
-
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "_templates": None}
 
@@ -116,8 +103,7 @@ class TableImages:
         depth = self.form.channels
         every = 0, self.form.frames * depth
         found = [*shapes, *(s for frame in squares for s in frame), *top]
-        scale = scale_of(self.scenario.scene, self.form)
-        self._kinds = outlines(found, scale, self.form)
+        self._kinds = outlines(found, self._scale(), self.form)
         rows = [every] * len(shapes)
         for f, frame in enumerate(squares):
             rows += [(f * depth, (f + 1) * depth)] * len(frame)
@@ -135,8 +121,8 @@ class TableImages:
         memory: Source,
         seats: Array,
         worlds: Rows = ALL,
-    ) -> Array:
-        """Return the images of some seats: `collect` and `draw`."""
+    ) -> Images:
+        """Return the observations of some seats: `collect` and `draw`."""
         return self.draw(self.collect(frames, state, memory, worlds), seats)
 
     def collect(
@@ -154,18 +140,19 @@ class TableImages:
         self.prepare(frames, state, memory)
         newest = self._newest(frames)
         shown = newest[worlds]
+        none = np.zeros((len(shown), 0))
         if not self._moves:
-            count = len(shown)
-            return Moving(shown, np.zeros((count, 0, CORNERS, 2)), np.zeros((count, 0)))
+            points = np.zeros((len(shown), 0, CORNERS, 2))
+            return Moving(shown, points, none, none)
         sources = state, memory, {"frames": newest}
         every = isinstance(worlds, slice)
         shapes = self._shapes
         (found,) = (
             shapes(*sources) if every else shapes.at(np.asarray(worlds), *sources)
         )
-        return Moving(shown, found["points"], found["shown"])
+        return Moving(shown, found["points"], found["shown"], none)
 
-    def draw(self, moving: Moving, seats: Array) -> Array:
+    def draw(self, moving: Moving, seats: Array) -> Images:
         """Return the images of some seats (W, S, H, W, channels), uint8, a new array.
 
         Args:
@@ -192,6 +179,14 @@ class TableImages:
 
         over_rows(work, worlds, LEAST)
         return out
+
+    def blank(self, rows: int) -> Images:
+        """Return observations of one seat that are all zeros (rows, ...)."""
+        return np.zeros((rows, *self.form.shape), np.uint8)
+
+    def _scale(self) -> float:
+        """Return the scale of the images, pixels/m."""
+        return scale_of(self.scenario.scene, self.form)
 
     def _newest(self, frames: Array) -> Array:
         """Return the last frames of a history that may be longer."""

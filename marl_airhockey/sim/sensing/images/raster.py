@@ -17,6 +17,9 @@ from marl_airhockey.types import Array
 LINES = 16
 """Number of lines on which the coverage of a row of pixels is computed. Along a line,
 it is exact."""
+ORDER = (0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15)
+"""Moment of the exposure at which each of these lines is evaluated. Neighbouring lines
+have moments that are far apart (van der Corput, 1935)."""
 CORNERS = 4
 """Largest number of points of a shape that moves."""
 FAR = 1e6
@@ -97,6 +100,9 @@ def paint(
     edges: Array,
     cover: Array,
     hole: Array,
+    opacity: float = 1.0,
+    right_by: float = 0.0,
+    down_by: float = 0.0,
 ) -> None:
     """Draw a shape into channels ``first`` to ``last`` of an image (H, W, channels).
 
@@ -114,6 +120,9 @@ def paint(
         edges: Scratch space (K, 2).
         cover: Scratch space (W + 2,).
         hole: Scratch space (W + 2,).
+        opacity: Opacity of the shape, 0 to 1.
+        right_by: Motion of the shape to the right during an exposure, pixels.
+        down_by: Motion of the shape down during an exposure, pixels.
     """
     height, width = image.shape[0], image.shape[1]
     sides, grown = 0, outer if count < 3 else 0.0
@@ -131,27 +140,29 @@ def paint(
         low_y, high_y = min(low_y, points[k, 1]), max(high_y, points[k, 1])
     if not far < FAR:
         return
-    left = max(math.floor(low_x - grown), 0)
-    right = min(math.ceil(high_x + grown) + 1, width)
+    wide, high = grown + 0.5 * abs(right_by), grown + 0.5 * abs(down_by)
+    left = max(math.floor(low_x - wide), 0)
+    right = min(math.ceil(high_x + wide) + 1, width)
     for y in range(
-        max(math.floor(low_y - grown), 0),
-        min(math.ceil(high_y + grown), height),
+        max(math.floor(low_y - high), 0),
+        min(math.ceil(high_y + high), height),
     ):
         for x in range(left, right + 2):
             cover[x] = hole[x] = 0.0
         for k in range(LINES):
-            line = y + (k + 0.5) / LINES
-            low, high = span(points, count, outer, edges, sides, line)
-            if low < high:
-                add(cover, low, high, 1.0)
+            when = (ORDER[k] + 0.5) / LINES - 0.5
+            line = y + (k + 0.5) / LINES - when * down_by
+            start, end = span(points, count, outer, edges, sides, line)
+            if start < end:
+                add(cover, start + when * right_by, end + when * right_by, 1.0)
             if inside > 0.0:
-                low, high = span(points, 1, inside, edges, 0, line)
-                if low < high:
-                    add(hole, low, high, 1.0)
+                start, end = span(points, 1, inside, edges, 0, line)
+                if start < end:
+                    add(hole, start + when * right_by, end + when * right_by, 1.0)
         total = within = 0.0
         for x in range(left, right):
-            total += cover[x] / LINES
-            within += hole[x] / LINES
+            total += opacity * cover[x] / LINES
+            within += opacity * hole[x] / LINES
             if total > 1e-6:
                 for c in range(first, last):
                     k = (c - first) % len(colour)
@@ -166,6 +177,7 @@ def paint(
 def paint_all(
     images: Array,
     points: Array,
+    shown: Array,
     count: Array,
     outer: Array,
     inside: Array,
@@ -180,6 +192,7 @@ def paint_all(
         images: Images (B, H, W, channels).
         points: Points (B, n, K, 2) of the shapes, K at least CORNERS, pixels; the other
             arguments are the same for all images.
+        shown: Opacity of the shapes (B, n), 0 to 1.
         count: Number of points (n,).
         outer: Radius, or half the width of a line, (n,), pixels.
         inside: Radius of the inner part of a disc (n,), pixels.
@@ -192,6 +205,8 @@ def paint_all(
     cover, hole = np.zeros(wide), np.zeros(wide)
     for b in range(images.shape[0]):
         for k in range(len(count)):
+            if shown[b, k] == 0.0:
+                continue
             paint(
                 images[b],
                 channels[k, 0],
@@ -206,4 +221,5 @@ def paint_all(
                 edges,
                 cover,
                 hole,
+                shown[b, k],
             )

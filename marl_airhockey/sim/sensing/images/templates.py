@@ -190,7 +190,8 @@ def draw(
     channels = np.tile([0, images.shape[3]], (len(found.count), 1))
     radii = larger * found.outer, larger * found.inside
     colours = found.colours, found.fills
-    paint_all(images, points, found.count, *radii, *colours, channels, rounding)
+    shown = np.ones(points.shape[:2])
+    paint_all(images, points, shown, found.count, *radii, *colours, channels, rounding)
 
 
 def _sprite(
@@ -215,7 +216,8 @@ def _sprite(
     ones, none = np.ones((rings, 1)), np.zeros(rings)
     channels = np.stack([np.arange(rings), np.arange(1, rings + 1)], -1)
     count = np.ones(rings, np.int64)
-    paint_all(cover, points, count, radii, none, ones, ones, channels, 0.0)
+    shown = np.ones((PHASES**2, rings))
+    paint_all(cover, points, shown, count, radii, none, ones, ones, channels, 0.0)
     shares = cover[..., :-1] - cover[..., 1:]
     sprite = np.empty((*cover.shape[:3], form.channels + 1))
     sprite[..., :-1] = FINE * (shares[..., None] * colours).sum(-2)
