@@ -103,6 +103,23 @@ def exported(
         ModuleNotFoundError: The linker for WebAssembly is not installed.
     """
     check_target(target)
+    texts, games = translated(scenarios, keywords, starts)
+    code = object_code(texts, target)
+    if target == "wasm32":
+        code = linked(code, list(texts))
+    return ExportedCode(code, games)
+
+
+def translated(
+    scenarios: Sequence[str], keywords: Keywords, starts: int = 1
+) -> tuple[dict[str, str], dict[str, ExportedGame]]:
+    """Return the LLVM texts of the functions of scenarios, and their arrays, by name.
+
+    The arguments are those of `exported`.
+
+    Raises:
+        ValueError: A control step is not compiled.
+    """
     given = list(scenarios), keywords, starts
     program = f"from {__name__} import _write; _write(*{given!r})"
     own = {"MARL_AIRHOCKEY_CACHE": "code", "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -120,10 +137,7 @@ def exported(
             )
             for scenario in scenarios
         }
-    code = object_code(texts, target)
-    if target == "wasm32":
-        code = linked(code, list(texts))
-    return ExportedCode(code, games)
+    return texts, games
 
 
 def _write(scenarios: Sequence[str], keywords: Keywords, starts: int) -> None:

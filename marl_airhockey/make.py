@@ -5,12 +5,13 @@ The packages that an environment needs are imported when it is created.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack, overload
 
 if TYPE_CHECKING:
     from gymnasium.vector import AutoresetMode
     from pettingzoo.utils.env import AECEnv
 
+    from marl_airhockey.device.world import DeviceWorld
     from marl_airhockey.envs.gymnasium_env import AirHockeySingleEnv
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
     from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
@@ -228,21 +229,46 @@ def make_torchrl(
     return AirHockeyTorchEnv(scenario, num_worlds, device, **keywords)
 
 
+@overload
 def make_world(
     scenario: str | Scenario, num_worlds: int = 1, **keywords: Unpack[Keywords]
-) -> World:
-    """Create B worlds with NumPy arrays: ``reset(seed)`` and ``step(actions)``.
+) -> World: ...
+
+
+@overload
+def make_world(
+    scenario: str | Scenario, num_worlds: int, device: str, **keywords: Unpack[Keywords]
+) -> DeviceWorld: ...
+
+
+def make_world(
+    scenario: str | Scenario,
+    num_worlds: int = 1,
+    device: str = "cpu",
+    **keywords: Unpack[Keywords],
+) -> World | DeviceWorld:
+    """Create B worlds with arrays: ``reset(seed)`` and ``step(actions)``.
 
     Args:
-        scenario: Name, code, class or object, see `registry.find_scenario`.
+        scenario: Name, code, class or object, see `registry.find_scenario`. On a GPU,
+            the name of a scenario.
         num_worlds: Number of worlds, B.
+        device: "cpu" for NumPy arrays, or the torch device of a GPU, such as "cuda".
         **keywords: Shared keywords, which `parallel_env` explains: backend="numba",
             drivers={}, seats, profile="ideal", observe, goals="flat", physics={},
             control_dt=0.05 (s), substeps, max_cycles (steps), options={}, rig.
 
     Returns:
-        Worlds. Actions are arrays (B, open, 2), and results are a `StepResult`.
+        Worlds. On the CPU, actions are arrays (B, open, 2), and results are a
+        `StepResult`. `device.world.DeviceWorld` explains those of a GPU.
     """
+    if device != "cpu":
+        from marl_airhockey.sim.core.errors import require
+
+        require("torch", "cuda")
+        from marl_airhockey.device.world import DeviceWorld
+
+        return DeviceWorld(scenario, num_worlds, device, keywords=keywords)
     from marl_airhockey.build import build_world
 
     return build_world(scenario, num_worlds, autoreset=True, keywords=keywords)

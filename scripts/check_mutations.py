@@ -131,7 +131,7 @@ FAULTS = [
     ),
     Fault(
         "gae ignores the end",
-        "marl_airhockey/learn/ppo.py",
+        "marl_airhockey/learn/advantages.py",
         "td_error = reward[t] + gamma * last_value * not_done[t] - value[t]",
         "td_error = reward[t] + gamma * last_value - value[t]",
         "learn/test_ppo.py",

@@ -152,7 +152,7 @@ def test_webassembly_computes_the_bits_of_python(
     assert found[1] > 10 or name != "duel"
     assert found[2] > 1 or name != "free_for_all"
     assert run(path, given, tmp_path) == found
-    given[10, 0, 0, 0] += 1e-9
+    given[10] *= 0.5
     assert run(path, given, tmp_path)[0] != found[0]
 
 

@@ -1,4 +1,4 @@
-"""Engine "torch": PPO in plain torch over B worlds in one process, in one file.
+"""Engine "torch": PPO in plain torch over B worlds in one process.
 
 The algorithm is that of Schulman et al. (2017) as in stable-baselines3, so presets are
 valid for both engines. This file omits the parts of that library that are not needed,
@@ -16,6 +16,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from marl_airhockey.envs.slots import SlotEnv
+from marl_airhockey.learn.advantages import generalized_advantage
 from marl_airhockey.learn.device import moved, torch_device
 from marl_airhockey.learn.engine import (
     AdaptiveRate,
@@ -63,45 +65,21 @@ class Rollout:
     """Success of the episodes that ended."""
 
 
-def generalized_advantage(
-    reward: Tensor,
-    value: Tensor,
-    last_value: Tensor,
-    not_done: Tensor,
-    gamma: float,
-    gae_lambda: float,
-) -> Tensor:
-    """Return generalized advantage estimates (T, n) (Schulman et al., 2016).
-
-    Args:
-        reward: Rewards of the steps, (T, n).
-        value: Critic's values of the observations before the steps, (T, n).
-        last_value: Critic's values of the observations after the last step, (n,).
-        not_done: 0 where an episode ended with the step, else 1, (T, n).
-        gamma: Discount factor.
-        gae_lambda: Lambda; 0 gives one-step errors, 1 gives whole returns.
-    """
-    advantage, running = torch.empty_like(value), torch.zeros_like(last_value)
-    for t in range(len(value) - 1, -1, -1):
-        td_error = reward[t] + gamma * last_value * not_done[t] - value[t]
-        running = td_error + gamma * gae_lambda * not_done[t] * running
-        advantage[t], last_value = running, value[t]
-    return advantage
-
-
 class Trainer:
     """PPO trainer of a run.
 
     Args:
         run: Run whose folder is updated.
+        env: Worlds of the training; None for those of the configuration.
     """
 
-    def __init__(self, run: TrainingRun[PPOConfig]) -> None:
+    def __init__(self, run: TrainingRun[PPOConfig], env: SlotEnv | None = None) -> None:
         config = self._config = run.config
         self._run = run
         self._device = torch_device(config.device)
         torch.manual_seed(config.seed)
-        self._env = make_training_env(config, config.num_worlds, run.folder / "pool")
+        pool = run.folder / "pool"
+        self._env = env or make_training_env(config, config.num_worlds, pool)
         layout = self._env.world.observer.layout
         self.model = ActorCritic(
             config.hidden, config.log_std_init, layout.centre, layout.unit
@@ -120,7 +98,7 @@ class Trainer:
         # A resumed run must not repeat the episodes of its beginning.
         self._env.seed(config.seed * 10_000 + run.progress.steps % 9973)
         self._log = RunLog(run.folder, run.progress.steps)
-        self._observation = self._env.reset()
+        self._observation = moved(self._env.reset(), self._device)
         end_setup(run)
 
     def train(self) -> Metrics:
@@ -165,14 +143,15 @@ class Trainer:
         with torch.inference_mode():
             spread = model.log_std.exp()
             for t in range(config.n_steps):
-                observation = model.scaled(moved(self._observation, device))
+                observation = model.scaled(self._observation)
                 rollout.observation[t] = observation
                 mean = model.actor(observation)
                 action = mean + spread * torch.randn_like(mean)
                 rollout.action[t] = action
                 rollout.density[t] = model.log_density(mean, action)
-                step = env.step(action.clamp(-1.0, 1.0).cpu().numpy())
-                self._observation, gained, done, infos = step
+                moves = action.clamp(-1.0, 1.0).cpu().numpy()
+                seen, gained, done, infos = env.step(moves)
+                self._observation = moved(seen, device)
                 reward[t] = torch.from_numpy(gained)
                 not_done[t] = torch.from_numpy(1.0 - done)
                 ended = np.flatnonzero(done).tolist()
@@ -191,8 +170,7 @@ class Trainer:
         config, model = self._config, self.model
         with torch.inference_mode():
             value = model.critic(rollout.observation)[..., 0]
-            after = moved(self._observation, self._device)
-            last = model.critic(model.scaled(after))[:, 0]
+            last = model.critic(model.scaled(self._observation))[:, 0]
             reward = rollout.reward
             if rollout.truncated:
                 steps, slots, seen = zip(*rollout.truncated, strict=True)

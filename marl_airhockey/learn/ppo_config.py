@@ -33,8 +33,8 @@ class PPOConfig(SelfPlayConfig):
     )
     """Names of the number settings that may be 0."""
     engine: str = "torch"
-    """Implementation: "torch" or "sb3" in this process, or "rllib" in many
-    processes."""
+    """Implementation: "torch" or "sb3" in this process, "rllib" in many processes, or
+    "device" for worlds on ``device``, too."""
     num_env_runners: int = 0
     """Number of processes in which rllib steps worlds, a divisor of ``num_worlds``; 0
     for the process of the learner. Other engines only have 0."""
@@ -91,6 +91,8 @@ class PPOConfig(SelfPlayConfig):
             raise ValueError("curriculum: only tasks with the engine torch have one")
         if self.exploiters and (self.engine != "torch" or not self.self_play):
             raise ValueError("exploiters: only games with the engine torch have them")
+        if self.engine == "device":
+            self._check_device()
         if self.engine == "rllib":
             self._check_rllib()
         elif self.num_env_runners:
@@ -121,6 +123,18 @@ class PPOConfig(SelfPlayConfig):
     def needs_sb3(observe: str, options: Mapping[str, Any]) -> bool:
         """Return True if only the engine sb3 learns from an observation type."""
         return shows_images(observe) or options.get("goals") == "dict"
+
+    def _check_device(self) -> None:
+        """Check that no setting needs the worlds of the CPU."""
+        names = "mirrored_share", "action_rate_weight", "action_jerk_weight"
+        used = [n for n in (*names, "cost_weight") if getattr(self, n)]
+        if used:
+            raise ValueError(f"{', '.join(used)}: the engine device does not have them")
+        if self.self_play and self.self_play_fraction != 1.0:
+            raise ValueError(
+                "self_play_fraction: with the engine device the learner plays all "
+                "seats; set it to 1"
+            )
 
     def _check_rllib(self) -> None:
         if self.device != "cpu":

@@ -228,10 +228,19 @@ def _rllib() -> Engine:
     return train_with_rllib
 
 
+def _device() -> Engine:
+    require("torch", "train")
+    require("tensorboard", "train")
+    from marl_airhockey.learn.ppo_device import train_on_device
+
+    return train_on_device
+
+
 ENGINES: dict[str, Callable[[], Engine]] = {
     "torch": _torch,
     "sb3": _sb3,
     "rllib": _rllib,
+    "device": _device,
 }
 """Loaders of the engines, by name. An engine is imported when it is used."""
 

@@ -100,7 +100,7 @@ def main(
         actions, trace, beyond = rule(0), [], 0.0
         for k in range(steps):
             world.step(actions(k, world))
-            rows: Array = world.backend.trace  # type: ignore[attr-defined]
+            rows: Array = world.backend.trace
             trace.append([rows[..., 0].min(), rows[..., 0].max()])
             trace[-1] += [rows[..., 1].max(), rows[..., 2].mean(), rows[..., 3].max()]
             room = np.einsum("skd,bsd->bsk", reach.normals, world.state.paddle)

@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from marl_airhockey.learn.ppo import generalized_advantage
+from marl_airhockey.learn.advantages import generalized_advantage
 
 
 def test_advantages_are_discounted_sums_of_td_errors():

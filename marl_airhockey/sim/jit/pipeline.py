@@ -114,6 +114,13 @@ class CompiledPart:
         self.arrays = inputs.arrays
         """Arrays by the index of their address in ``where``."""
         self._strides = np.array(inputs.strides, np.int64)
+        self.shared = {
+            inputs.values[k]
+            for k, array in self.arrays.items()
+            # An empty array can have the address of another one.
+            if array.size and not inputs.strides[k]
+        }
+        """Addresses of the arrays that all worlds share."""
         functions: dict[str, Any] = {"pointer": pointer}
         functions |= {f"f{i}": stage.function for i, stage in enumerate(stages)}
         self.kernel: Any = load(source, name, functions).kernel

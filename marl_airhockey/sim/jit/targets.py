@@ -15,11 +15,19 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from llvmlite import binding
+
+from marl_airhockey.sim.jit.runtime import (
+    ARENA,
+    LONG_PRODUCT,
+    MEMORY,
+    WASM_RUNTIME,
+    runtime_of,
+)
 
 UNOPTIMISED = {
     "NUMBA_OPT": "0",
@@ -50,94 +58,21 @@ TARGETS = {
     "aarch64": CodeTarget("aarch64-unknown-linux-gnu", "generic", "", ".o"),
     "x86_64": CodeTarget("x86_64-unknown-linux-gnu", "x86-64", "", ".o"),
 }
-"""Targets by name."""
+"""Targets of exported code by name."""
+GPU = "nvptx64"
+MACHINES = {
+    **TARGETS,
+    GPU: CodeTarget("nvptx64-nvidia-cuda", "sm_80", "+ptx80", ".ptx"),
+}
+"""All targets by name."""
 
-ARENA = 1 << 17
-"""Size of the memory for arrays that the functions create, bytes. It is empty again
-after each call. The functions of a world use a sixth of it."""
-_RUNTIME = f"""
-%header = type {{ i64, ptr, ptr, ptr, i64 }}
-@arena = internal global [{ARENA} x i8] zeroinitializer, align 64
-@used = internal global i64 0
-
-define ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %align) {{
-  %before = load i64, ptr @used
-  %more = add i64 %size, 191
-  %whole = and i64 %more, -64
-  %after = add i64 %before, %whole
-  %full = icmp ugt i64 %after, {ARENA}
-  br i1 %full, label %none, label %some
-none:
-  ret ptr null
-some:
-  store i64 %after, ptr @used
-  %head = getelementptr i8, ptr @arena, i64 %before
-  %data = getelementptr i8, ptr %head, i64 64
-  store i64 1, ptr %head
-  %slot = getelementptr %header, ptr %head, i32 0, i32 3
-  store ptr %data, ptr %slot
-  ret ptr %head
-}}
-
-declare double @llvm.sqrt.f64(double)
-
-define double @sqrt(double %x) {{
-  %root = call double @llvm.sqrt.f64(double %x)
-  ret double %root
-}}
-
-define void @NRT_MemInfo_call_dtor(ptr %header) {{
-  ret void
-}}
-
-define i32 @numba_attempt_nocopy_reshape(i64 %n, ptr %shape, ptr %strides,
-    i64 %new_n, ptr %new_shape, ptr %new_strides, i64 %size, i32 %fortran) {{
-  store i64 %size, ptr %new_strides
-  %flat = icmp eq i64 %new_n, 1
-  %done = zext i1 %flat to i32
-  ret i32 %done
-}}
-"""
-"""What numba's code needs from outside: memory, flat views of arrays, and roots."""
-_LONG_PRODUCT = "__multi3"
-_WASM_RUNTIME = f"""
-define void @{_LONG_PRODUCT}(ptr %out, i64 %a, i64 %a_high, i64 %b, i64 %b_high)
-    noinline optnone {{
-  %a0 = and i64 %a, 4294967295
-  %a1 = lshr i64 %a, 32
-  %b0 = and i64 %b, 4294967295
-  %b1 = lshr i64 %b, 32
-  %p00 = mul i64 %a0, %b0
-  %p01 = mul i64 %a0, %b1
-  %p10 = mul i64 %a1, %b0
-  %p11 = mul i64 %a1, %b1
-  %carry = lshr i64 %p00, 32
-  %middle = add i64 %p10, %carry
-  %middle_low = and i64 %middle, 4294967295
-  %middle_high = lshr i64 %middle, 32
-  %other = add i64 %p01, %middle_low
-  %other_high = lshr i64 %other, 32
-  %sum = add i64 %p11, %middle_high
-  %upper = add i64 %sum, %other_high
-  %cross = mul i64 %a_high, %b
-  %cross_2 = mul i64 %a, %b_high
-  %with = add i64 %upper, %cross
-  %high = add i64 %with, %cross_2
-  %low = mul i64 %a, %b
-  store i64 %low, ptr %out
-  %second = getelementptr i64, ptr %out, i32 1
-  store i64 %high, ptr %second
-  ret void
-}}
-"""
-"""Product of numbers of 128 bits, which LLVM calls and WebAssembly does not have."""
 _ENTRY = """
 declare i32 @inner.{name}(ptr, ptr, ptr, ptr, i64, i64, ptr, i64, i64, i64)
 
 define i32 @{name}(ptr %where, i64 %length, i64 %worlds) {{
   %going = alloca i8
   %error = alloca ptr
-  store i64 0, ptr @used
+  store i64 64, ptr @memory
   %status = call i32 @inner.{name}(ptr %going, ptr %error, ptr null, ptr null,
     i64 %length, i64 8, ptr %where, i64 %length, i64 8, i64 %worlds)
   %fine = icmp eq i32 %status, 0
@@ -183,13 +118,30 @@ def object_code(parts: Mapping[str, str], target: str) -> bytes:
 
 def optimised(parts: Mapping[str, str], target: str, machine: Any) -> Any:
     """Return the LLVM module of an object file, see `object_code`."""
-    runtime = _RUNTIME + (_WASM_RUNTIME if target == "wasm32" else "")
-    whole = _parsed(runtime + "".join(_ENTRY.format(name=n) for n in parts), machine)
-    for name, text in parts.items():
-        whole.link_in(_renamed(text, name, machine))
+    runtime = runtime_of(ARENA) + MEMORY + (WASM_RUNTIME if target == "wasm32" else "")
+    text = runtime + "".join(_ENTRY.format(name=name) for name in parts)
+    return linked_module(text, parts, machine, (*parts, LONG_PRODUCT))
+
+
+def linked_module(
+    text: str, parts: Mapping[str, str], machine: Any, public: Collection[str]
+) -> Any:
+    """Return an optimised LLVM module.
+
+    Args:
+        text: LLVM text of the functions that call the parts.
+        parts: LLVM texts by the names of the functions, see `text_of`.
+        machine: LLVM machine of the target.
+        public: Names of the functions that are called from outside.
+
+    Raises:
+        ValueError: The code needs a function of the C library of this machine.
+    """
+    whole = _parsed(text, machine)
+    for name, part in parts.items():
+        whole.link_in(_renamed(part, name, machine))
     for function in whole.functions:
-        outside = (*parts, _LONG_PRODUCT)
-        if not function.is_declaration and function.name not in outside:
+        if not function.is_declaration and function.name not in public:
             function.linkage = "internal"
     for variable in whole.global_variables:
         if not variable.is_declaration:
@@ -240,7 +192,7 @@ def machine_of(target: str) -> Any:
     """Return the LLVM machine of a target, by name."""
     binding.initialize_all_targets()
     binding.initialize_all_asmprinters()
-    triple, processor, features, _ = TARGETS[target]
+    triple, processor, features, _ = MACHINES[target]
     return binding.Target.from_triple(triple).create_target_machine(
         cpu=processor, features=features, opt=3, reloc="static"
     )

@@ -50,8 +50,8 @@ class Layout(NamedTuple):
     offsets: list[int]
     """Positions of the 64-bit words in the image that are offsets in it."""
     arrays: dict[str, dict[str, Any]]
-    """``offset``, ``shape`` and ``dtype`` of each named array. Moment 0 is the current
-    one of a new episode."""
+    """``offset``, ``shape`` and ``dtype`` of each named array, and ``shared`` if it is
+    that of all worlds. Moment 0 is the current one of a new episode."""
     calls: dict[str, list[Call]]
     """Calls by name: "step_0" from moment 0 to moment 1, "step_1" back, and extras."""
     parts: list[CompiledPart]
@@ -91,8 +91,10 @@ def layout_of(world: World, extras: Sequence[Extra] = ()) -> Layout:
     roots += [(extra.name, extra.arrays) for extra in extras]
     # Of several names of an array, the last one is used.
     names = {a.ctypes.data: name for root in roots for name, a in _arrays(*root)}
+    alike = {a for part in every for a in part.shared}
     arrays = {
         names.get(address, f"constant_{k}"): blocks.entry(array)
+        | ({"shared": True} if address in alike else {})
         for k, (address, array) in enumerate(sorted(blocks.arrays.items()))
     }
     used = list(functions.values())
