@@ -70,7 +70,8 @@ def train(
         str | None,
         typer.Option(
             help="Implementation of PPO: torch (the usual one), sb3 "
-            "(stable-baselines3), or rllib (several processes)."
+            "(stable-baselines3), rllib (several processes), or device (worlds on a "
+            "GPU)."
         ),
     ] = None,
     device: Annotated[

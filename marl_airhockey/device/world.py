@@ -149,9 +149,11 @@ class DeviceWorld:
         self._now, b, text = 0, self.num_worlds, self._text
         rows = self._memory.view(b, text.stride)
         pool = self._pools[0].view(self._starts, text.size)
-        chosen = torch.arange(b, device=self.device) % self._starts
         rows[:, :HEADER] = 0
-        rows[:, HEADER : HEADER + text.size] = pool[chosen]
+        for first in range(0, b, self._starts):
+            count = min(self._starts, b - first)
+            part = rows[first : first + count, HEADER : HEADER + text.size]
+            part.copy_(pool[:count])
         self._observation.copy_(self._array("observe.observation"))
         return self._observation
 

@@ -64,7 +64,8 @@ class RunConfig:
     """Number of threads of torch, above 0."""
     device: str = "cpu"
     """Device of torch that learns: "cpu", "cuda", "cuda:NUMBER", or "auto" for a GPU if
-    there is one. Worlds and evaluations are on the CPU."""
+    there is one. Evaluations are on the CPU, and worlds, too, except with the engine
+    "device"."""
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -39,6 +39,7 @@ class Method(NamedTuple):
 
 
 IMAGES = {"observe": "pixels:colour=rgb", "evaluations": 2}
+CAMERA = {**IMAGES, "observe": "camera:colour=rgb"}
 LARGE = {**IMAGES, "network": "resnet18", "batch_size": 32}
 LEARNED = {
     **{"observe": "pixels:size=64", "num_worlds": 64, "n_steps": 64},
@@ -47,6 +48,10 @@ LEARNED = {
 METHODS = {
     "states": Method(TASKS, 2, "bc", {"evaluations": 2}),
     "images": Method(TASKS, 1, "bc", IMAGES),
+    "camera": Method(TASKS, 1, "bc", CAMERA),
+    "longer": Method(
+        ("juggle", "hit_goal"), 1, "bc", {**IMAGES, "total_steps": 30_000}
+    ),
     "PPO": Method(("reach", "touch"), 1, "ppo", LEARNED),
     "ResNet-18": Method(("reach",), 1, "bc", {**LARGE, "total_steps": 1000}),
 }

@@ -29,7 +29,11 @@ def require(module: str, extra: str) -> None:
         RuntimeError: The module is not installed. The message contains the command
             that installs it.
     """
-    if importlib.util.find_spec(module) is None:
+    try:
+        found = importlib.util.find_spec(module) is not None
+    except ModuleNotFoundError:  # The package of the module is missing.
+        found = False
+    if not found:
         raise RuntimeError(
             f"{module} is not installed: pip install 'marl_airhockey[{extra}]', or "
             f"'.[{extra}]' in a clone"

@@ -158,6 +158,12 @@ def test_what_a_camera_cannot_show_is_named(task, observe, message):
         ah.make_world(task, observe=observe)
 
 
+def test_obstacles_are_named():
+    obstacle = {"obstacles": [[0.2, 0.0, 0.05]]}
+    with pytest.raises(ValueError, match="a camera does not show obstacles"):
+        ah.make_world("reach", observe="camera", options=obstacle)
+
+
 def test_a_rig_without_a_lens_or_of_another_table_is_named(tmp_path):
     path = rig_of(tmp_path)
     with pytest.raises(ValueError, match=r"the rig's 'full_size'; pass options"):

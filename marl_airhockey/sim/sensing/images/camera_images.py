@@ -52,8 +52,8 @@ class CameraImages(TableImages):
         model: Camera above the tables.
 
     Raises:
-        ValueError: The scene has more than one seat, or the images of all worlds need
-            more memory than this machine has.
+        ValueError: The scene has more than one seat, or obstacles, or the images of
+            all worlds need more memory than this machine has.
     """
 
     def __init__(
@@ -68,6 +68,11 @@ class CameraImages(TableImages):
             raise ValueError(
                 f"observe: a camera shows one arm, but {scenario.name!r} has {seats} "
                 'seats; use observe="pixels"'
+            )
+        if scenario.scene.obstacles:
+            raise ValueError(
+                "observe: a camera does not show obstacles, which no real table has; "
+                'use observe="pixels"'
             )
         super().__init__(scenario, form, num_worlds)
         self.model, scene = model, scenario.scene
