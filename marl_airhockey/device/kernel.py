@@ -21,6 +21,7 @@ import numpy as np
 
 from marl_airhockey.device.llvm_text import LlvmText, double
 from marl_airhockey.sim.backends.numba.flight import block_space
+from marl_airhockey.toolkit.serves import SPREAD
 
 HEADER = 64
 """Size of the header of a world, bytes: status (int32), and number of the episode
@@ -30,8 +31,6 @@ NUMBER = 8
 SPARE = 1 << 14
 """Size of the memory for arrays that functions create, in addition to those of free
 flight, bytes. Doubles use a third of it."""
-SPREAD = 0.3
-"""Largest angle between a serve and its heading, rad, as in `toolkit.serves`."""
 
 
 class KernelText(LlvmText):

@@ -30,6 +30,8 @@ GAP = 0.005
 """Smallest distance between a served puck and any other body, m."""
 SPEED = 0.5
 """Speed of a served puck, m/s."""
+SPREAD = 0.3
+"""Largest angle between a serve and its heading, rad."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +144,7 @@ def serve(
     _serve(
         *(state.position, state.velocity, state.spin, state.touching),
         *(bodies.puck.start, puck, np.array(bodies.radius), _positions(scene)[puck]),
-        *(np.flatnonzero(some), heading + 0.3 * draws[:, 0], SPIN * draws[:, 1]),
+        *(np.flatnonzero(some), heading + SPREAD * draws[:, 0], SPIN * draws[:, 1]),
     )
 
 

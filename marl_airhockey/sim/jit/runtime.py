@@ -1,4 +1,4 @@
-"""What numba's code needs from outside, as LLVM text: memory, roots, long products."""
+"""Functions that numba's code needs: memory, roots and long products, as LLVM text."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ define i32 @numba_attempt_nocopy_reshape(i64 %n, ptr %shape, ptr %strides,
   ret i32 %done
 }}
 """
-"""What numba's code needs from outside: memory, flat views of arrays, and roots. The
+"""Functions that numba's code needs: memory, flat views of arrays, and roots. The
 function ``arena`` returns the address of the memory, whose first word is the number of
 its used bytes."""
 MEMORY = f"""

@@ -97,13 +97,18 @@ def test_the_puck_has_the_colour_of_the_rig_and_is_blurred_when_it_moves(tmp_pat
     assert red[1].sum() == pytest.approx(red[0].sum(), rel=0.04)
 
 
-def test_frames_have_the_latency_of_the_rig_and_the_time_between_frames(tmp_path):
-    world = ah.make_world("strike", 64, observe=FORM, **FULL)
+def ages_of(form, worlds):
+    """Return the ages (worlds,) of the newest frames, s."""
+    world = ah.make_world("strike", worlds, observe=form, **FULL)
     world.reset(0)
     state = world.state
     state.position[:, 1], state.velocity[:, 1] = (0.0, 0.0), (0.5, 0.0)
     world.set_state(state)
-    ages = -world.sensor.photos[FORM].rows[:, -1, 1, 0] / 0.5
+    return -world.sensor.photos[form].rows[:, -1, 1, 0] / 0.5
+
+
+def test_frames_have_the_latency_of_the_camera_and_the_time_between_frames():
+    ages = ages_of(FORM, 64)
     assert ages.min() > 0.028 - 1e-9
     assert ages.max() < 0.028 + 1 / 30
     assert ages.mean() == pytest.approx(0.028 + 1 / 60, abs=0.004)
@@ -111,13 +116,7 @@ def test_frames_have_the_latency_of_the_rig_and_the_time_between_frames(tmp_path
 
 def test_dropped_frames_make_the_newest_one_older(tmp_path):
     path = rig_of(tmp_path, dropped=0.3, latency=0.01)
-    form = f"camera:rig={path},frames=1"
-    world = ah.make_world("strike", 512, observe=form, **FULL)
-    world.reset(0)
-    state = world.state
-    state.position[:, 1], state.velocity[:, 1] = (0.0, 0.0), (0.5, 0.0)
-    world.set_state(state)
-    ages = -world.sensor.photos[form].rows[:, -1, 1, 0] / 0.5
+    ages = ages_of(f"camera:rig={path},frames=1", 512)
     missing = np.floor((ages - 0.01) * 60 + 1e-6)
     shares = [(missing == k).mean() for k in range(3)]
     np.testing.assert_allclose(shares, [0.7, 0.21, 0.09], atol=0.06)
