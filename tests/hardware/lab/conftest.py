@@ -25,6 +25,15 @@ def rig(lab, tmp_path_factory):
         yield path
 
 
+@pytest.fixture(autouse=True)
+def puck_in_sight(request):
+    """Place the puck where the arm does not hide it, whatever was tested before."""
+    if "lab" in request.fixturenames:
+        lab = request.getfixturevalue("lab")
+        lab.ask({"do": "place", "puck": [0.3, 0.0], "velocity": [0.0, 0.0]})
+        time.sleep(0.2)
+
+
 @pytest.fixture
 def fault(lab):
     """Switch a fault on; all are off afterwards."""

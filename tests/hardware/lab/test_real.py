@@ -230,10 +230,7 @@ def test_what_is_wrong_with_the_picture_is_noticed_first(rig, fault, name, words
         ah.parallel_env("juggle", **keywords(rig))
 
 
-def test_a_puck_without_the_mark_of_its_rig_is_noticed_first(lab, rig, tmp_path):
-    # The arm must not hide the puck.
-    lab.ask({"do": "place", "puck": [0.3, 0.0], "velocity": [0.0, 0.0]})
-    time.sleep(0.2)
+def test_a_puck_without_the_mark_of_its_rig_is_noticed_first(rig, tmp_path):
     marked = tmp_path / "rig.json"
     dataclasses.replace(Rig.load(rig), puck_marked=True).save(marked)
     with pytest.raises(RuntimeError, match="shows no mark"):
