@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from pathlib import Path
+from collections.abc import Collection
 
 import numpy as np
 
+from marl_airhockey.cameras import camera_models
 from marl_airhockey.registry import (
     DEFAULT_BACKEND,
     find_backend,
@@ -14,21 +14,13 @@ from marl_airhockey.registry import (
     make_driver,
 )
 from marl_airhockey.sim.contracts.backend import Backend, LiveBackend
-from marl_airhockey.sim.contracts.camera_model import CameraModel, lab_camera
 from marl_airhockey.sim.contracts.driver import Driver
-from marl_airhockey.sim.contracts.image_form import (
-    CameraForm,
-    image_form,
-    shows_camera,
-)
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.checks import check_count
 from marl_airhockey.sim.core.errors import (
     unknown_name,
 )
 from marl_airhockey.sim.core.physics import Physics
-from marl_airhockey.sim.core.scene import Scene
-from marl_airhockey.sim.core.table import TABLES, Table
 from marl_airhockey.sim.jit.threads import threads
 from marl_airhockey.sim.world.keywords import Keywords, check_keywords
 from marl_airhockey.sim.world.world import World
@@ -74,7 +66,7 @@ def build_world(
     kind = _backend_of(game, keywords)
     live = issubclass(kind, LiveBackend)
     physics = _physics(game, kind, keywords, real=live)
-    drivers = _drivers(game, live, keywords)
+    drivers = seat_drivers(game, keywords, live)
     backend = _backend(kind, game, num_worlds, keywords)
     usual = "velocity" if profile == "ideal" else "history"
     own = [driver.observe for driver in drivers.values() if driver.observe]
@@ -82,47 +74,6 @@ def build_world(
     every = dict.fromkeys([keywords.get("observe", usual), *own, *forms])
     parts = game, backend, drivers, physics, tuple(every), max_cycles, autoreset
     return World(*parts, camera_models(every, game.scene, backend))
-
-
-def camera_models(
-    forms: Iterable[str], scene: Scene, backend: Backend | None = None
-) -> dict[str, CameraModel]:
-    """Return the cameras of the observation types that show one.
-
-    Args:
-        forms: Observation types.
-        scene: Scene on the table.
-        backend: Backend. A real table has a camera of its own.
-
-    Raises:
-        ValueError: The file of a rig is not valid, or describes another table.
-    """
-    shown = {form: image_form(form) for form in forms if shows_camera(form)}
-    if isinstance(backend, LiveBackend):
-        return dict.fromkeys(shown, backend.camera_model)
-    return {
-        form: _rig_camera(form, settings.rig, scene.table)
-        for form, settings in shown.items()
-        if isinstance(settings, CameraForm)
-    }
-
-
-def _rig_camera(form: str, rig: str, table: Table) -> CameraModel:
-    """Return the camera of a rig, by its file; "" for the camera of the virtual lab."""
-    if not rig:
-        return lab_camera(table)
-    from marl_airhockey.hardware.rig import Rig
-
-    try:
-        known = Rig.load(Path(rig))
-    except ValueError as error:
-        raise ValueError(f"observe: {form!r}: {error}") from error
-    if TABLES[known.table] != table:
-        raise ValueError(
-            f"observe: {form!r}: the scenario's table is not the rig's "
-            f'{known.table!r}; pass options={{"table": "{known.table}"}}'
-        )
-    return known.camera_model
 
 
 def build_driven_world(
@@ -230,8 +181,19 @@ def _physics(
     )
 
 
-def _drivers(game: Scenario, live: bool, keywords: Keywords) -> dict[int, Driver]:
-    """Return the drivers in the keywords, by seat index."""
+def seat_drivers(
+    game: Scenario, keywords: Keywords, live: bool = False
+) -> dict[int, Driver]:
+    """Return the drivers in the keywords, by seat index.
+
+    Args:
+        game: Scenario with the seats.
+        keywords: Keywords of a world.
+        live: True if a real arm would follow the drivers.
+
+    Raises:
+        ValueError: A name is unknown, or a driver must not move an arm.
+    """
     agents = [f"paddle_{i}" for i in range(len(game.scene.seats))]
     drivers: dict[int, Driver] = {}
     for agent, driver in keywords.get("drivers", {}).items():

@@ -120,6 +120,8 @@ def translated(
     Raises:
         ValueError: A control step is not compiled.
     """
+    for scenario in scenarios:
+        check_exported(build_world(scenario, 1, False, keywords))
     given = list(scenarios), keywords, starts
     program = f"from {__name__} import _write; _write(*{given!r})"
     own = {"MARL_AIRHOCKEY_CACHE": "code", "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -138,6 +140,19 @@ def translated(
             for scenario in scenarios
         }
     return texts, games
+
+
+def check_exported(world: World) -> None:
+    """Check that the control step of a world is all in the exported code.
+
+    Raises:
+        ValueError: The scenario has regions with drag.
+    """
+    if world.scenario.drag_regions:
+        raise ValueError(
+            "drag_regions: the compiled control step does not include them; leave the "
+            "option out"
+        )
 
 
 def _write(scenarios: Sequence[str], keywords: Keywords, starts: int) -> None:

@@ -208,9 +208,12 @@ def make_torchrl(
     """Create a TorchRL EnvBase of B worlds with a group of agents for each team.
 
     Args:
-        scenario: Name, code, class or object, see `registry.find_scenario`.
+        scenario: Name, code, class or object, see `registry.find_scenario`. On a GPU,
+            the name of a scenario.
         num_worlds: Number of worlds, B, which is the batch size (B,).
-        device: Torch device of the returned tensors.
+        device: "cpu", or the torch device of a GPU, such as "cuda", which computes the
+            worlds, see `device.world.DeviceWorld`. To use worlds of the CPU with
+            tensors on a GPU, call ``.to("cuda")`` of the environment.
         **keywords: Shared keywords, which `parallel_env` explains: backend="numba",
             drivers={}, seats, profile="ideal", observe, goals="flat", physics={},
             control_dt=0.05 (s), substeps, max_cycles (steps), options={}, rig.
@@ -226,7 +229,15 @@ def make_torchrl(
     require("torchrl", "ecosystem")
     from marl_airhockey.envs.torchrl_env import AirHockeyTorchEnv
 
-    return AirHockeyTorchEnv(scenario, num_worlds, device, **keywords)
+    if device == "cpu":
+        from marl_airhockey.build import build_world
+
+        world = build_world(scenario, num_worlds, autoreset=False, keywords=keywords)
+        return AirHockeyTorchEnv(world)
+    from marl_airhockey.device.world import DeviceWorld
+
+    more: dict[str, Any] = {"autoreset": False, "keywords": keywords}
+    return AirHockeyTorchEnv(DeviceWorld(scenario, num_worlds, device, **more))
 
 
 @overload

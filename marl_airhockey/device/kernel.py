@@ -7,68 +7,20 @@ that all worlds share are read from one place.
 A world has `HEADER` bytes, then its image (`sim.world.layout`), then the memory for
 arrays that functions create. ``begin`` prepares the images of starts. ``step`` copies
 the actions, calls the functions of a step, serves pucks, observes, copies the results,
-and begins a new episode if one ended.
+and begins a new episode if one ended and ``restart`` is true.
 """
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Mapping, Sequence
-from math import prod
-from typing import Any
+import math
 
-import numpy as np
-
-from marl_airhockey.device.llvm_text import LlvmText, double
-from marl_airhockey.sim.backends.numba.flight import block_space
+from marl_airhockey.device.llvm_text import double
+from marl_airhockey.device.world_text import HEADER, NUMBER, WorldText, rounded
 from marl_airhockey.toolkit.serves import SPREAD
 
-HEADER = 64
-"""Size of the header of a world, bytes: status (int32), and number of the episode
-(int64) at `NUMBER`."""
-NUMBER = 8
-"""Position of the number of the episode in the header."""
-SPARE = 1 << 14
-"""Size of the memory for arrays that functions create, in addition to those of free
-flight, bytes. Doubles use a third of it."""
 
-
-class KernelText(LlvmText):
-    """LLVM text of the kernels of a scenario.
-
-    Args:
-        facts: Description of the arrays and calls, see `code_export`.
-        image: Arrays at the start of an episode.
-    """
-
-    def __init__(self, facts: Mapping[str, Any], image: bytes) -> None:
-        super().__init__()
-        self._facts, self._image = facts, image
-        self._arrays = facts["arrays"]
-        self._addresses = set(facts["offsets"])
-        self._shared = {a["offset"] for a in self._arrays.values() if a.get("shared")}
-        self.ring = len(image) + -len(image) % 16
-        """Offset of the past that seats observe with a reaction time."""
-        self.delayed = [
-            (name, self._source(name))
-            for name in self._arrays
-            if name.startswith(("observe.state.", "observe.memory."))
-        ]
-        """Observed arrays, and the arrays that they are copies of."""
-        self.slot = sum(_rounded(self._bytes(name)) for name, _ in self.delayed)
-        self.size = self.ring + (facts["reaction"] + 1) * self.slot
-        """Size of the image of a world with its past, bytes."""
-        movers = facts["bodies"]["blocks"][1]
-        self.arena = block_space(movers).nbytes + SPARE
-        """Size of the memory for arrays that the functions of a world create, bytes."""
-        self.stride = HEADER + self.size + self.arena
-        """Distance between two worlds in memory, bytes."""
-
-    @property
-    def functions(self) -> list[str]:
-        """Names of the functions that the kernels call."""
-        calls = [call for row in self._facts["calls"].values() for call in row]
-        return list(dict.fromkeys(call["function"] for call in calls))
+class KernelText(WorldText):
+    """LLVM text of the kernels of a scenario; `WorldText` explains the arguments."""
 
     def text(self) -> str:
         """Return the functions ``world.begin`` and ``world.step`` of one world."""
@@ -81,17 +33,6 @@ class KernelText(LlvmText):
         self._begin()
         self._step()
         return "\n".join(self._lines) + "\n"
-
-    def _bytes(self, name: str) -> int:
-        """Return the size of an array, or of one of the moments."""
-        entry = self._arrays.get(f"moment_0.{name}") or self._arrays[name]
-        size: int = prod(entry["shape"]) * np.dtype(entry["dtype"]).itemsize
-        return size
-
-    def _source(self, name: str) -> str:
-        """Return the name, without the moment, of what an observed array copies."""
-        _, kind, rest = name.split(".", 2)
-        return f"state.{rest}" if kind == "state" else f"verdict.memory.{rest}"
 
     def _begin(self) -> None:
         self._define(
@@ -108,9 +49,9 @@ class KernelText(LlvmText):
         shown = self._bytes("observe.observation")
         self._define(
             "internal i32 @world.step(ptr %memory, ptr %shared, ptr %starts, "
-            "i64 %world_number, i64 %worlds, i64 %rows, i1 %odd, ptr %actions, "
-            "ptr %observation, ptr %final, ptr %reward, ptr %ended, ptr %success) "
-            "alwaysinline"
+            "i64 %world_number, i64 %worlds, i64 %rows, i1 %odd, i1 %restart, "
+            "ptr %actions, ptr %observation, ptr %final, ptr %reward, ptr %ended, "
+            "ptr %success) alwaysinline"
         )
         self._add(f"%far = mul i64 %world_number, {self.stride}")
         self._add("%header = getelementptr i8, ptr %memory, i64 %far")
@@ -119,6 +60,7 @@ class KernelText(LlvmText):
         self._add("%odd_after = xor i1 %odd, true")
         given, size = self._at("inputs.action", "%odd"), 16 * seats
         self._copy(given, self._row("%actions", size), size)
+        self._eliminate()
         self._call("step", "%odd")
         self._serve()
         if self._facts["reaction"]:
@@ -136,6 +78,7 @@ class KernelText(LlvmText):
         observed = self._at("observe.observation", "%odd")
         self._branch(self._ended(), "over", "going")
         self._copy(self._row("%final", shown), observed, shown, row=True)
+        self._branch("%restart", "again", "going")
         self._restart()
         self._add("br label %going")
         self._lines.append("going:")
@@ -150,7 +93,7 @@ class KernelText(LlvmText):
             skipped = self._new(f"mul i64 %worlds, {k}")
             number = self._new(f"add i64 %world_number, {skipped}")
             place = self._new(f"getelementptr i8, ptr %ended, i64 {number}")
-            self._add(f"store i8 {flag}, ptr {place}")
+            self._store("i8", flag, place)
             flags.append(flag)
         either = self._new(f"or i8 {flags[0]}, {flags[1]}")
         return self._new(f"icmp ne i8 {either}, 0")
@@ -158,15 +101,39 @@ class KernelText(LlvmText):
     def _restart(self) -> None:
         """Begin the next episode of a world."""
         number = self._new(f"getelementptr i8, ptr %header, i64 {NUMBER}")
-        before = self._load("i64", number)
-        after = self._new(f"add i64 {before}, 1")
-        self._add(f"store i64 {after}, ptr {number}")
-        skipped = self._new(f"mul i64 {after}, %worlds")
-        wanted = self._new(f"add i64 %world_number, {skipped}")
-        row = self._new(f"urem i64 {wanted}, %rows")
+        after = self._new(f"add i64 {self._load('i64', number)}, %worlds")
+        self._store("i64", after, number)
+        row = self._new(f"urem i64 {after}, %rows")
         start = self._new(f"mul i64 {row}, {self.size}")
         begun = self._new(f"getelementptr i8, ptr %starts, i64 {start}")
         self._copy("%world", begun, self.size)
+
+    def _eliminate(self) -> None:
+        """Move the paddles of eliminated seats away, and close their goals."""
+        found = self._facts["elimination"]
+        if not found:
+            return
+        self._call("show", "%odd")
+        flags = []
+        for seat, parking in enumerate(found["parking"]):
+            flags.append(self._load("i8", self._at("eliminated", "%odd", "show", seat)))
+            gone = self._new(f"icmp ne i8 {flags[-1]}, 0")
+            self._store("i8", flags[-1], self._at("inputs.raised", "%odd", more=seat))
+            for axis in range(2):
+                place = self._at("inputs.action", "%odd", more=8 * (2 * seat + axis))
+                wanted = self._load("double", place)
+                self._choose(gone, double(0.0), wanted, place)
+            for k, value in enumerate(parking):
+                place = self._at("inputs.prescribed", "%odd", more=8 * (4 * seat + k))
+                self._choose(gone, double(value), double(math.nan), place)
+        for line, seat in enumerate(found["owner"]):
+            closed = flags[seat] if seat >= 0 else "0"
+            self._store("i8", closed, self._at("inputs.closed", "%odd", more=line))
+
+    def _choose(self, condition: str, yes: str, no: str, place: str) -> None:
+        """Store one of two doubles."""
+        value = self._new(f"select i1 {condition}, double {yes}, double {no}")
+        self._store("double", value, place)
 
     def _serve(self) -> None:
         """Serve the pucks of a world that needs it, in its moment after the step."""
@@ -191,7 +158,7 @@ class KernelText(LlvmText):
                 names = [f"serve_{n}_{puck}.{part}" for n in range(2)]
                 offsets = [self._arrays[name]["offset"] for name in names]
                 place = self._selected(offsets, "%odd_after")
-                self._add(f"store double {value}, ptr {place}")
+                self._store("double", value, place)
             self._call(f"serve_{{}}_{puck}", "%odd_after")
             self._add(f"br label %after_{puck}")
             self._lines.append(f"after_{puck}:")
@@ -210,89 +177,16 @@ class KernelText(LlvmText):
         at = self.ring + slot * self.slot
         for name, source in self.delayed:
             self._copy(self._place(at), self._at(source, odd), self._bytes(name))
-            at += _rounded(self._bytes(name))
+            at += rounded(self._bytes(name))
 
     def _observe(self, odd: str) -> None:
         """Observe the oldest slot of the past, and the own paddle of now."""
         at = self.ring
         for name, _ in self.delayed:
             self._copy(self._at(name, odd), self._place(at), self._bytes(name))
-            at += _rounded(self._bytes(name))
+            at += rounded(self._bytes(name))
         for own, of in (("own", "position"), ("own_velocity", "velocity")):
             if (name := f"observe.sensor.{own}") in self._arrays:
                 source = self._at(f"state.{of}", odd)
                 self._copy(self._at(name, odd), source, self._bytes(name))
         self._call("observe", odd)
-
-    def _call(self, name: str, odd: str) -> None:
-        """Call the functions of a name, such as ``step`` for "step_0" and "step_1"."""
-        calls = self._facts["calls"]
-        both = [
-            calls.get(name.format(n)) or calls.get(f"{name}_{n}") or calls[name]
-            for n in range(2)
-        ]
-        for first, second in zip(*both, strict=True):
-            self._call_one(first, second, odd)
-
-    def _call_one(
-        self, first: Mapping[str, Any], second: Mapping[str, Any], odd: str
-    ) -> None:
-        length = first["length"]
-        self._add("call void @set_arena(ptr %arena)")
-        table = self._local(f"[{length} x i64]")
-        for index in range(length):
-            words = [self._word(call["table"] + 8 * index) for call in (first, second)]
-            is_address = first["table"] + 8 * index in self._addresses
-            value = str(words[0])
-            if is_address:
-                place = self._selected(words, odd)
-                value = self._new(f"ptrtoint ptr {place} to i64")
-            slot = self._new(f"getelementptr i64, ptr {table}, i64 {index}")
-            self._add(f"store i64 {value}, ptr {slot}")
-        going, error = self._local("i8"), self._local("ptr")
-        status = self._new(
-            f"call i32 @inner.{first['function']}(ptr {going}, ptr {error}, ptr null, "
-            f"ptr null, i64 {length}, i64 8, ptr {table}, i64 {length}, i64 8, i64 1)"
-        )
-        fine = self._new(f"icmp eq i32 {status}, 0")
-        finite = self._load("i8", going)
-        more = self._new(f"icmp ne i8 {finite}, 0")
-        result = self._new(f"select i1 {fine}, i32 0, i32 -1")
-        good = self._new(f"and i1 {fine}, {more}")
-        number = self._count
-        self._add(f"br i1 {good}, label %good_{number}, label %bad_{number}")
-        self._lines += [f"bad_{number}:", f"  ret i32 {result}", f"good_{number}:"]
-
-    def _word(self, at: int) -> int:
-        found: int = struct.unpack_from("<q", self._image, at)[0]
-        return found
-
-    def _selected(self, offsets: Sequence[int], odd: str, more: int = 0) -> str:
-        """Return the address at one of two offsets, plus ``more`` bytes."""
-        first, second = offsets
-        if first == second:
-            return self._place(first + more, first in self._shared)
-        offset = self._new(f"select i1 {odd}, i64 {second + more}, i64 {first + more}")
-        return self._new(f"getelementptr i8, ptr %world, i64 {offset}")
-
-    def _place(self, offset: int, shared: bool = False) -> str:
-        base = "%shared" if shared else "%world"
-        return self._new(f"getelementptr i8, ptr {base}, i64 {offset}")
-
-    def _at(self, name: str, odd: str, kind: str = "moment", more: int = 0) -> str:
-        """Return the address of an array of a moment, or without moments."""
-        names = [f"{kind}_{n}.{name}" for n in range(2)]
-        if names[0] not in self._arrays:
-            names = [name, name]
-        offsets = [self._arrays[n]["offset"] for n in names]
-        assert not any(offset % 8 for offset in offsets), "arrays must be aligned"
-        return self._selected(offsets, odd, more)
-
-    def _row(self, array: str, size: int) -> str:
-        """Return the address of the world's row of an array of results."""
-        at = self._new(f"mul i64 %world_number, {size}")
-        return self._new(f"getelementptr i8, ptr {array}, i64 {at}")
-
-
-def _rounded(size: int) -> int:
-    return size + -size % 8

@@ -33,6 +33,9 @@ class LlvmText:
     def _load(self, kind: str, place: str) -> str:
         return self._new(f"load {kind}, ptr {place}")
 
+    def _store(self, kind: str, value: str, place: str) -> None:
+        self._add(f"store {kind} {value}, ptr {place}")
+
     def _branch(self, condition: str, yes: str, no: str) -> None:
         self._add(f"br i1 {condition}, label %{yes}, label %{no}")
         self._lines.append(f"{yes}:")

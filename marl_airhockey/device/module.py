@@ -20,8 +20,8 @@ THREADS = 128
 _BEGIN = "ptr %memory, ptr %shared, ptr %scratch, i64 %worlds, i64 %odd"
 _STEP = (
     "ptr %memory, ptr %shared, ptr %starts, i64 %worlds, i64 %rows, i64 %odd, "
-    "ptr %actions, ptr %observation, ptr %final, ptr %reward, ptr %ended, "
-    "ptr %success"
+    "i64 %restarts, ptr %actions, ptr %observation, ptr %final, ptr %reward, "
+    "ptr %ended, ptr %success"
 )
 _ONE_BEGIN = """
   %far = mul i64 %b, {size}
@@ -31,9 +31,10 @@ _ONE_BEGIN = """
   %done = call i32 @world.begin(ptr %world, ptr %shared, i1 %is_odd, ptr %arena)
 """
 _ONE_STEP = """
+  %restart = trunc i64 %restarts to i1
   %done = call i32 @world.step(ptr %memory, ptr %shared, ptr %starts, i64 %b,
-    i64 %worlds, i64 %rows, i1 %is_odd, ptr %actions, ptr %observation, ptr %final,
-    ptr %reward, ptr %ended, ptr %success)
+    i64 %worlds, i64 %rows, i1 %is_odd, i1 %restart, ptr %actions, ptr %observation,
+    ptr %final, ptr %reward, ptr %ended, ptr %success)
   %fine = icmp eq i32 %done, 1
   br i1 %fine, label %next, label %wrong
 wrong:

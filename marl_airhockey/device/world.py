@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from marl_airhockey.build import build_world
-from marl_airhockey.code_export import ExportedGame
-from marl_airhockey.device.code import device_code
-from marl_airhockey.device.kernel import HEADER, KernelText
-from marl_airhockey.device.launch import CudaLauncher, HostLauncher, Launcher
-from marl_airhockey.device.module import HOST
+from marl_airhockey.build import build_world, seat_drivers
+from marl_airhockey.code_export import check_exported
+from marl_airhockey.device.critic import DeviceCriticState
+from marl_airhockey.device.memory import WorldMemory
+from marl_airhockey.device.networks import DeviceNetwork, network_of
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.checks import check_count
-from marl_airhockey.sim.jit.targets import GPU
 from marl_airhockey.sim.world.keywords import Keywords, check_keywords
-from marl_airhockey.types import Array
 
 STARTS = 1024
 """Default number of starts of episodes."""
-FAILURES = {1: "an action is not finite", 2: "a function needs more memory"}
-"""Reasons why the step of a world failed, by its status."""
 
 
 class DeviceStep(NamedTuple):
-    """Result of a control step of B worlds with S seats, for all seats."""
+    """Result of a control step of B worlds with S open seats."""
 
     observation: Tensor
-    """(B, S, D) float32; of the new episode in worlds in which one ended."""
+    """(B, S, D) float32; of the new episode in worlds that began one."""
     reward: Tensor
     """(B, S) float64."""
     terminated: Tensor
@@ -46,11 +41,12 @@ class DeviceStep(NamedTuple):
 class DeviceWorld:
     """B worlds of a scenario on a torch device, with the bits of a CPU.
 
-    All seats are open and observe the true state, with the reaction time of the game.
-    Starts are sampled on the CPU. Episode n of world i has the start, the physics and
-    the random streams of the seed (i + n B) modulo the number of starts.
+    Seats without a driver are open. They observe the true state, with the reaction time
+    of the game. Starts are sampled on the CPU, when the worlds are created. Episode n
+    of world i has the start, the physics and the random streams of the seed
+    (s + i + n B) modulo the number of starts, where s is the seed of `reset`.
 
-    The tensors of a result are overwritten by the next step.
+    The tensors of a result are overwritten by the next step or reset.
 
     Args:
         scenario: Name of a scenario.
@@ -58,7 +54,9 @@ class DeviceWorld:
         device: Torch device, such as "cuda". On "cpu", the same code runs on one core,
             for tests.
         starts: Number of different starts.
-        keywords: Keywords as of `make.make_world`.
+        keywords: Keywords as of `make.make_world`. Drivers are policies.
+        autoreset: True to begin a new episode in the step in which one ended. False if
+            `reset_worlds` begins it.
 
     Raises:
         ValueError: A keyword is not supported on a device. The message names it.
@@ -69,9 +67,10 @@ class DeviceWorld:
         self,
         scenario: str | Scenario,
         num_worlds: int,
-        device: str = "cuda",
+        device: torch.device | str = "cuda",
         starts: int = STARTS,
         keywords: Keywords | None = None,
+        autoreset: bool = True,
     ) -> None:
         keywords = keywords or Keywords()
         check_keywords(keywords)
@@ -80,103 +79,131 @@ class DeviceWorld:
                 f"scenario: {scenario!r}: worlds on a device need the name of a "
                 "scenario, and its options as options={...}"
             )
-        _check_supported(scenario, keywords)
+        _check_supported(keywords)
         self.num_worlds = check_count("num_worlds", num_worlds)
         self.device = torch.device(device)
-        if self.device.type == "cuda" and not torch.cuda.is_available():
-            raise RuntimeError(f"device: {device!r}: torch finds no GPU here")
         check_count("starts", starts)
-        target = GPU if self.device.type == "cuda" else HOST
-        self._game, code = device_code(scenario, keywords, starts, target)
-        self._starts, self._text = starts, KernelText(*self._game)
-        self._launcher: Launcher = (
-            CudaLauncher(code, self.device.index or 0)
-            if target == GPU
-            else HostLauncher(code)
-        )
+        self._autoreset, self._seed = autoreset, 0
+        undriven: Keywords = {**keywords, "drivers": {}}
+        self.single = build_world(scenario, 1, autoreset, undriven)
+        """A world on the CPU, with the scene, the spaces and the labels."""
+        check_exported(self.single)
+        if self.single.physics.any_of("action_delay"):
+            raise ValueError(
+                "physics: action_delay is not supported on a device; leave it out"
+            )
+        width = len(self.single.observation_labels)
+        networks = {
+            seat: network_of(f"paddle_{seat}", driver, width)
+            for seat, driver in seat_drivers(self.single.scenario, keywords).items()
+        }
+        if self.device.type == "cuda" and not torch.cuda.is_available():
+            raise RuntimeError(f"device: {str(device)!r}: torch finds no GPU here")
+        self._networks = {
+            seat: DeviceNetwork(network, self.device)
+            for seat, network in networks.items()
+        }
+        seats = range(len(self.single.scene.seats))
+        self.open = [seat for seat in seats if seat not in networks]
+        """Indices of the open seats."""
+        self._memory = WorldMemory(scenario, num_worlds, self.device, starts, undriven)
         self._build()
 
     def _build(self) -> None:
-        """Allocate the memory of the worlds, and prepare the starts."""
-        text, b, device = self._text, self.num_worlds, self.device
-        images = start_images(self._game, text.size)
-        both = [images, swapped(self._game, images)]
-        self._pools = [torch.from_numpy(rows).to(device) for rows in both]
-        scratch = torch.empty(len(images) * text.arena, dtype=torch.uint8)
-        scratch = scratch.to(device)
-        for odd, pool in enumerate(self._pools):
-            arguments = pool, pool, scratch
-            self._launch("begin", self._starts, *arguments, self._starts, odd)
-        self._memory = torch.zeros(b * text.stride, dtype=torch.uint8, device=device)
-        facts = self._game.facts
-        _, seats, width = facts["arrays"]["observe.observation"]["shape"]
-        made: dict[str, Any] = {"device": device}
-        self._observation = torch.zeros((b, seats, width), **made)
-        self._final = torch.zeros((b, seats, width), **made)
-        self._reward = torch.zeros((b, seats), dtype=torch.float64, **made)
-        self._ended = torch.zeros((2, b), dtype=torch.bool, **made)
-        self._actions = torch.zeros((b, seats, 2), dtype=torch.float64, **made)
-        self._success = torch.zeros((b, seats), dtype=torch.bool, **made)
-        self._now = 0
+        """Allocate the tensors of the results, for all seats."""
+        seats, width = self.single.scene.seats, len(self.single.observation_labels)
+        rows = self.num_worlds, len(seats)
+
+        def made(*shape: int, dtype: torch.dtype = torch.float32) -> Tensor:
+            return torch.zeros(shape, dtype=dtype, device=self.device)
+
+        self._observation, self._final = made(*rows, width), made(*rows, width)
+        self._reward = made(*rows, dtype=torch.float64)
+        self._ended = made(2, self.num_worlds, dtype=torch.bool)
+        self._actions = made(*rows, 2, dtype=torch.float64)
+        self._success = made(*rows, dtype=torch.bool)
+        self._critic = DeviceCriticState(self.single, self._memory)
+        chosen = torch.tensor(self.open, device=self.device)
+        self._chosen = chosen if self._networks else None
 
     @property
     def seats(self) -> int:
-        """Number of seats, S."""
-        return self._actions.shape[1]
-
-    def _launch(self, kernel: str, worlds: int, *arguments: Tensor | int) -> None:
-        values = [a.data_ptr() if isinstance(a, Tensor) else a for a in arguments]
-        self._launcher.launch(kernel, worlds, *values)
-
-    def _array(self, name: str) -> Tensor:
-        """Return an array of all worlds (B, ...), a view of the memory."""
-        entry = self._game.facts["arrays"][name]
-        kind = getattr(torch, entry["dtype"])
-        size = kind.itemsize
-        rows = self._memory.view(self.num_worlds, self._text.stride)
-        start = HEADER + entry["offset"]
-        count = int(np.prod(entry["shape"]))
-        flat = rows[:, start : start + count * size].view(kind)
-        found: Tensor = flat.reshape(self.num_worlds, *entry["shape"][1:])
-        return found
+        """Number of open seats, S."""
+        return len(self.open)
 
     def current(self, name: str) -> Tensor:
         """Return an array of the current moment (B, ...), such as "state.position"."""
-        return self._array(f"moment_{self._now}.{name}")
+        return self._memory.array(f"moment_{self._memory.now}.{name}")
 
-    def reset(self) -> Tensor:
-        """Begin the first episode in all worlds; return the observation (B, S, D)."""
-        self._now, b, text = 0, self.num_worlds, self._text
-        rows = self._memory.view(b, text.stride)
-        pool = self._pools[0].view(self._starts, text.size)
-        rows[:, :HEADER] = 0
-        for first in range(0, b, self._starts):
-            count = min(self._starts, b - first)
-            part = rows[first : first + count, HEADER : HEADER + text.size]
-            part.copy_(pool[:count])
-        self._observation.copy_(self._array("observe.observation"))
-        return self._observation
+    def observation(self) -> Tensor:
+        """Return the current observation of the open seats (B, S, D)."""
+        (seen,) = self._of_open([self._observation])
+        return seen
+
+    def critic_state(self) -> Tensor:
+        """Return the true state for a critic of all seats (B, n), float32, a new one.
+
+        `global_state.GlobalState` defines the elements.
+        """
+        return self._critic.read()
+
+    def seed(self, seed: int | None = None) -> None:
+        """Set the number that the next `reset` adds to the numbers of all starts.
+
+        Args:
+            seed: Number, 0 or more; None for 0.
+        """
+        self._seed = seed or 0
+
+    def reset(self, seed: int | None = None) -> Tensor:
+        """Begin the first episode in all worlds; return the observation (B, S, D).
+
+        Args:
+            seed: Number as of `seed`, or None for the one that was set last.
+        """
+        if seed is not None:
+            self.seed(seed)
+        self._memory.begin(self._seed)
+        self._observation.copy_(self._memory.array("observe.observation"))
+        return self.observation()
+
+    def reset_worlds(self, worlds: Tensor) -> None:
+        """Begin a new episode in some worlds, by index (W,)."""
+        self._memory.restart(worlds)
+        seen = self._memory.array("observe.observation")
+        self._observation[worlds] = seen[worlds]
 
     def step(self, actions: Tensor) -> DeviceStep:
-        """Move all worlds by a control step; begin a new episode where one ended.
+        """Move all worlds by a control step.
 
         Args:
             actions: Target velocities (B, S, 2), divided by the top speed, ego frames.
         """
-        self._actions.copy_(actions)
-        after = 1 - self._now
-        self._launch(
-            *("step", self.num_worlds, self._memory, self._pools[0]),
-            *(self._pools[after], self.num_worlds, self._starts, self._now),
-            *(self._actions, self._observation, self._final, self._reward, self._ended),
-            self._success,
+        memory = self._memory
+        if self._chosen is None:
+            self._actions.copy_(actions)
+        else:
+            self._actions[:, self._chosen] = actions.to(self._actions.dtype)
+        for seat, network in self._networks.items():
+            self._actions[:, seat] = network(self._observation[:, seat]).double()
+        after = 1 - memory.now
+        memory.launch(
+            *("step", self.num_worlds, memory.rows, memory.pools[0]),
+            *(memory.pools[after], self.num_worlds, memory.starts, memory.now),
+            *(int(self._autoreset), self._actions, self._observation, self._final),
+            *(self._reward, self._ended, self._success),
         )
-        self._now = after
+        memory.now = after
         terminated, truncated = self._ended
-        return DeviceStep(
-            *(self._observation, self._reward, terminated, truncated),
-            *(self._success, self._final),
-        )
+        arrays = self._observation, self._reward, self._success, self._final
+        seen, reward, success, final = self._of_open(arrays)
+        return DeviceStep(seen, reward, terminated, truncated, success, final)
+
+    def _of_open(self, arrays: Iterable[Tensor]) -> list[Tensor]:
+        """Return the rows of the open seats of arrays (B, seats, ...)."""
+        if self._chosen is None:
+            return list(arrays)
+        return [array.index_select(1, self._chosen) for array in arrays]
 
     def check(self) -> None:
         """Check that no step failed; it waits for the device.
@@ -184,43 +211,17 @@ class DeviceWorld:
         Raises:
             ValueError: The step of a world failed. The message gives the reason.
         """
-        rows = self._memory.view(self.num_worlds, self._text.stride)
-        status = rows[:, :4].view(torch.int32)[:, 0]
-        for number, reason in FAILURES.items():
-            if bool((status == number).any()):
-                world = int((status == number).nonzero()[0, 0])
-                raise ValueError(f"world {world}: {reason}")
+        self._memory.check()
+
+    def close(self) -> None:
+        """Close the world on the CPU."""
+        self.single.close()
 
 
-def start_images(game: ExportedGame, size: int) -> Array:
-    """Return the images of all starts (rows, size), with space for their past."""
-    words, values = game.facts["starts"]["words"], game.facts["starts"]["values"]
-    rows = np.zeros((len(values), size), np.uint8)
-    rows[:, : len(game.image)] = np.frombuffer(game.image, np.uint8)
-    longs = rows.view(np.uint64)
-    for row, text in enumerate(values):
-        longs[row, words] = np.frombuffer(bytes.fromhex(text), np.uint64)
-    return rows
-
-
-def swapped(game: ExportedGame, images: Array) -> Array:
-    """Return images in which moment 1 is the current one."""
-    other, arrays = images.copy(), game.facts["arrays"]
-    for name, entry in arrays.items():
-        twin = name.replace("moment_0.", "moment_1.", 1)
-        if name.startswith("moment_0.") and twin in arrays:
-            size = int(np.prod(entry["shape"])) * np.dtype(entry["dtype"]).itemsize
-            starts = entry["offset"], arrays[twin]["offset"]
-            a, b = (slice(start, start + size) for start in starts)
-            other[:, a], other[:, b] = images[:, b], images[:, a]
-    return other
-
-
-def _check_supported(scenario: str, keywords: Keywords) -> None:
+def _check_supported(keywords: Keywords) -> None:
     """Raise ValueError for what worlds on a device cannot do."""
     reasons = {
         "backend": keywords.get("backend", "numba") != "numba",
-        "drivers": bool(keywords.get("drivers")),
         "profile": keywords.get("profile", "ideal") != "ideal",
         "observe": keywords.get("observe", "velocity") != "velocity",
         "goals": keywords.get("goals", "flat") != "flat",
@@ -229,11 +230,5 @@ def _check_supported(scenario: str, keywords: Keywords) -> None:
         if unsupported:
             raise ValueError(
                 f"{name}: {keywords.get(name)!r} is not supported on a device; omit "
-                f"{name}, or use device='cpu' of make_world"
+                f"{name}, or use device='cpu'"
             )
-    world = build_world(scenario, 1, True, keywords)
-    world.reset(0)
-    if world.eliminated is not None:
-        raise ValueError(
-            f"{scenario!r}: games that eliminate players are not supported on a device"
-        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 import torch
@@ -11,11 +11,9 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from marl_airhockey.build import build_world
-from marl_airhockey.sim.contracts.scenario import Scenario
-from marl_airhockey.sim.world.keywords import Keywords
-from marl_airhockey.sim.world.observation import Observation
+from marl_airhockey.device.world import DeviceWorld
 from marl_airhockey.sim.world.spaces import observation_space
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
 
 
@@ -41,10 +39,8 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
     set.
 
     Args:
-        scenario: Name, code, class or object, see `registry.find_scenario`.
-        num_worlds: Number of worlds, B.
-        device: Device of the tensors. The physics is computed on the CPU.
-        **keywords: Shared keywords, see `make.parallel_env`.
+        world: Worlds without autoreset, on the CPU or on a device. The tensors of
+            worlds on a device stay there.
 
     Raises:
         ValueError: Observations are images or dictionaries.
@@ -52,37 +48,33 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
 
     batch_locked = True
 
-    def __init__(
-        self,
-        scenario: str | Scenario,
-        num_worlds: int = 1,
-        device: torch.device | str = "cpu",
-        **keywords: Unpack[Keywords],
-    ) -> None:
-        super().__init__(device=device, batch_size=[num_worlds])
-        self.world = build_world(
-            scenario, num_worlds, autoreset=False, keywords=keywords
-        )
-        seats = self.world.scene.seats
-        teams = np.array([seats[i].team for i in self.world.open])
+    def __init__(self, world: World | DeviceWorld) -> None:
+        if isinstance(world, DeviceWorld):
+            known, device = world.single, world.device
+        else:
+            known, device = world, torch.device("cpu")
+        super().__init__(device=device, batch_size=[world.num_worlds])
+        self.world, self._known = world, known
+        seats = self._known.scene.seats
+        teams = np.array([seats[i].team for i in world.open])
         rows = {f"team_{k}": np.flatnonzero(teams == k) for k in np.unique(teams)}
         self._rows: dict[str, Array] = rows
         self.group_map = {
-            group: [f"paddle_{self.world.open[i]}" for i in mine]
+            group: [f"paddle_{world.open[i]}" for i in mine]
             for group, mine in rows.items()
         }
         """Names of the agents of each group."""
         self._make_specs()
 
     def _make_specs(self) -> None:
-        own = observation_space(self.world.observer)
+        own = observation_space(self._known.observer)
         if not isinstance(own, spaces.Box) or len(own.shape) != 1:
             raise ValueError(
                 f"observations: TorchRL needs flat numbers, got {own}; "
                 'choose another observe= and goals="flat"'
             )
         batch, device = tuple(self.batch_size), self.device
-        whole = self.world.critic_state_space
+        whole = self._known.critic_state_space
         low, high = torch.as_tensor(whole.low), torch.as_tensor(whole.high)
         observation: dict[str, Any] = {
             "state": Bounded(
@@ -111,12 +103,12 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
     @property
     def observation_labels(self) -> tuple[str, ...]:
         """Name of each element of an agent's observation."""
-        return self.world.observer.labels
+        return self._known.observation_labels
 
     @property
     def state_labels(self) -> tuple[str, ...]:
         """Name of each element of ``state``."""
-        return self.world.critic_state_labels
+        return self._known.critic_state_labels
 
     def _set_seed(self, seed: int | None) -> None:
         self.world.seed(seed)
@@ -128,30 +120,35 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
         if some is None or bool(some.all()):
             observation = self.world.reset()
         else:
-            self.world.reset_worlds(np.flatnonzero(some.numpy(force=True)))
+            self.world.reset_worlds(self._given(some.flatten().nonzero()[:, 0]))
             observation = self.world.observation()
-        going = np.zeros(self.world.num_worlds, np.bool_)
+        going = torch.zeros(self.batch_size, dtype=torch.bool, device=self.device)
         return self._tensors(observation, going, going)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         worlds, seats = self.world.num_worlds, len(self.world.open)
-        actions = np.empty((worlds, seats, 2))
+        actions = torch.empty(
+            (worlds, seats, 2), dtype=torch.float64, device=self.device
+        )
         for group, mine in self._rows.items():
-            actions[:, mine] = tensordict[group, "action"].numpy(force=True)
-        result = self.world.step(actions)
+            actions[:, mine] = tensordict[group, "action"].double()
+        result = self.world.step(self._given(actions))
         after = self._tensors(result.observation, result.terminated, result.truncated)
         reward = self._tensor(result.reward)[..., None]
         for group, mine in self._rows.items():
             after[group, "reward"] = reward[:, mine]
         return after
 
-    def _tensors(
-        self, observation: Observation, terminated: Array, truncated: Array
-    ) -> TensorDict:
+    def _given(self, tensor: torch.Tensor) -> Any:
+        """Return a tensor as the worlds take it."""
+        on_device = isinstance(self.world, DeviceWorld)
+        return tensor if on_device else tensor.numpy(force=True)
+
+    def _tensors(self, observation: Any, terminated: Any, truncated: Any) -> TensorDict:
         """Return the entries that a reset and a step have in common."""
         batch, seen = self.batch_size, self._tensor(observation)
         ended, out_of_time = (
-            torch.as_tensor(flag.copy(), device=self.device)[:, None]
+            torch.asarray(flag, device=self.device, copy=True)[:, None]
             for flag in (terminated, truncated)
         )
         groups = {
@@ -170,6 +167,6 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
         return torch.as_tensor(array, dtype=torch.float32, device=self.device)
 
     def close(self, *, raise_if_closed: bool = True) -> None:
-        """Close the backend and the drivers."""
+        """Close the worlds."""
         super().close(raise_if_closed=raise_if_closed)
         self.world.close()

@@ -38,6 +38,9 @@ class PPOConfig(SelfPlayConfig):
     num_env_runners: int = 0
     """Number of processes in which rllib steps worlds, a divisor of ``num_worlds``; 0
     for the process of the learner. Other engines only have 0."""
+    cuda_graph: bool = True
+    """True to repeat the kernels of a rollout as one CUDA graph. Only with the engine
+    device, on a GPU, with an even ``n_steps``."""
     init: str = ""
     """Folder of a run of the same engine and network size whose weights the training
     begins with; "" for new weights. Not with rllib."""

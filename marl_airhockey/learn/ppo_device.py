@@ -1,6 +1,7 @@
 """Engine "device": PPO whose worlds are computed where the networks are.
 
-Rollouts stay on the device. Only their means are copied to the CPU, once per rollout.
+Rollouts stay on the device. Only their means are copied to the CPU, once per rollout. A
+GPU repeats the kernels of a rollout as one CUDA graph.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from torch import Tensor
 
 from marl_airhockey.device.world import DeviceWorld
 from marl_airhockey.envs.slots import SlotEnv
+from marl_airhockey.learn.cuda_graph import Recorded
 from marl_airhockey.learn.engine import end_setup, training_threads
 from marl_airhockey.learn.evaluate_policy import Metrics
 from marl_airhockey.learn.ppo import Rollout, Trainer
@@ -38,14 +40,34 @@ class DeviceTrainer(Trainer):
             str(self._device),
             keywords=config.training_keywords,
         )
-        self._observation = self._slots(self._worlds.reset())
+        # A resumed run must not repeat the episodes of its beginning.
+        self._worlds.reset(config.seed * 10_000 + run.progress.steps % 9973)
+        self._observation = self._slots()
+        # With an even number of steps, each rollout begins in the same moment's arrays.
+        graph = config.cuda_graph and config.n_steps % 2 == 0
+        self._recorded = Recorded(self._play, graph and self._device.type == "cuda")
         end_setup(run)
 
-    def _slots(self, rows: Tensor) -> Tensor:
-        """Return rows of worlds and seats (B, S, ...) as a new array of slots."""
-        return rows.flatten(0, 1).clone()
+    def _slots(self) -> Tensor:
+        """Return the observation of all slots (B S, D), world by world."""
+        return self._worlds.observation().flatten(0, 1)
 
     def _collect(self) -> Rollout:
+        rollout, finished, successful = self._recorded()
+        self._worlds.check()
+        self._observation = self._slots()
+        self._log.record("rollout/episodes", float(finished) / self._worlds.seats)
+        if finished:
+            self._log.record("rollout/success", float(successful / finished))
+        return rollout
+
+    def _play(self) -> tuple[Rollout, Tensor, Tensor]:
+        """Play ``n_steps`` steps of all slots, without waiting for the device.
+
+        Returns:
+            Steps, number of slots whose episode ended, and number of those that ended
+            with success.
+        """
         config, model, worlds = self._config, self.model, self._worlds
         seats = worlds.seats
         made: dict[str, Any] = {"device": self._device}
@@ -63,7 +85,7 @@ class DeviceTrainer(Trainer):
         with torch.inference_mode():
             spread = model.log_std.exp()
             for t in range(config.n_steps):
-                observation = model.scaled(self._observation)
+                observation = model.scaled(self._slots())
                 mean = model.actor(observation)
                 action = mean + spread * torch.randn_like(mean)
                 rollout.observation[t], rollout.action[t] = observation, action
@@ -78,12 +100,7 @@ class DeviceTrainer(Trainer):
                 rollout.reward[t], rollout.not_done[t] = reward, (~ended).float()
                 finished += ended.sum()
                 successful += (step.success.flatten() & ended).sum()
-                self._observation = self._slots(step.observation)
-        worlds.check()
-        self._log.record("rollout/episodes", float(finished) / seats)
-        if finished:
-            self._log.record("rollout/success", float(successful / finished))
-        return rollout
+        return rollout, finished, successful
 
 
 def train_on_device(run: TrainingRun[PPOConfig]) -> Metrics:

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from marl_airhockey.build import camera_models
+from marl_airhockey.cameras import camera_models
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.rollouts.collector import Collector
 from marl_airhockey.rollouts.columns import (

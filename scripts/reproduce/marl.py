@@ -34,6 +34,8 @@ from rows import DATA, Again, Book, Cell, Row, RowsFile, read
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 import marl_airhockey as ah
+from marl_airhockey.build import build_world
+from marl_airhockey.envs.torchrl_env import AirHockeyTorchEnv
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 
 ALGORITHMS = {"mappo": MappoConfig, "ippo": IppoConfig, "maddpg": MaddpgConfig}
@@ -69,7 +71,8 @@ def settings(frames: int) -> ExperimentConfig:
 
 def measure(experiment: Experiment, game: str) -> tuple[float, float]:
     """Return the success and the mean return of a team over whole episodes."""
-    env = ah.make_torchrl(game, EPISODES, drivers=GAMES[game])
+    world = build_world(game, EPISODES, False, {"drivers": GAMES[game]})
+    env = AirHockeyTorchEnv(world)
     env.set_seed(TEST_SEED)
     seen = env.reset()
     going = torch.ones(EPISODES, dtype=torch.bool)
@@ -78,7 +81,7 @@ def measure(experiment: Experiment, game: str) -> tuple[float, float]:
         while bool(going.any()):
             seen = env.step(experiment.policy(seen))["next"]
             paid += going * seen["team_0", "reward"][:, 0, 0]
-            success = torch.as_tensor(env.world.episode.success[:, 0].copy())
+            success = torch.as_tensor(world.episode.success[:, 0].copy())
             succeeded |= going & success
             going &= ~seen["done"][:, 0]
     env.close()

@@ -41,6 +41,8 @@ class GlobalState:
         first = np.zeros(1, np.int64)
         rng = RandomStreams.keyed(first, first, "start")
         self._memory: Memory = world.scenario.reset(rng, 1)[1]
+        self.memory_names = tuple(self._memory)
+        """Names of the arrays of the memory, in the order of their elements."""
         self._rotating = scene.bodies.blocks if scene.block_shape == "square" else 0
         self._bound = self._bounds()
         self.labels = tuple(self._names())
@@ -81,7 +83,7 @@ class GlobalState:
         state, memory = world.get_state()
         b, first = world.num_worlds, bodies.movers - self._rotating
         motion = np.concatenate([state.position, state.velocity], -1)
-        kept = [memory[name].reshape(b, -1) for name in self._memory]
+        kept = [memory[name].reshape(b, -1) for name in self.memory_names]
         parts = (
             motion[:, : bodies.movers].reshape(b, -1),
             state.puck_edge,

@@ -50,7 +50,7 @@ class AirHockeyClass(TaskClass):
             keywords["drivers"] = dict.fromkeys(others, shared["opponent"])
 
         def build() -> EnvBase:
-            env = ah.make_torchrl(game, num_envs, device, **keywords)
+            env = ah.make_torchrl(game, num_envs, **keywords).to(device)
             env.set_seed(seed)
             return env
 
