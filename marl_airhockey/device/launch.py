@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from abc import ABC, abstractmethod
 
+import torch
 from llvmlite import binding
 
 from marl_airhockey.device.module import THREADS
@@ -63,22 +64,29 @@ class CudaLauncher(Launcher):
         require("cuda.core", "cuda")
         from cuda.core import Device, ObjectCode
 
-        Device(device).set_current()
-        loaded = ObjectCode.from_ptx(code)
-        self._kernels = {name: loaded.get_kernel(name) for name in ("begin", "step")}
+        self._device = device
+        # The thread's current GPU is again the one before.
+        with torch.cuda.device(device):
+            Device(device).set_current()
+            loaded = ObjectCode.from_ptx(code)
+            names = "begin", "step"
+            self._kernels = {name: loaded.get_kernel(name) for name in names}
 
     def launch(self, kernel: str, worlds: int, *arguments: int) -> None:
         from cuda.core import LaunchConfig, launch
 
         config = LaunchConfig(grid=-(-worlds // THREADS), block=THREADS)
         values = [ctypes.c_int64(value) for value in arguments]
-        launch(_TorchStream(), config, self._kernels[kernel], *values)
+        with torch.cuda.device(self._device):
+            stream = _TorchStream(torch.cuda.current_stream())
+            launch(stream, config, self._kernels[kernel], *values)
 
 
 class _TorchStream:
-    """Current stream of torch, by the protocol of cuda-core."""
+    """Stream of torch, by the protocol of cuda-core."""
+
+    def __init__(self, stream: torch.cuda.Stream) -> None:
+        self._stream = stream
 
     def __cuda_stream__(self) -> tuple[int, int]:
-        import torch
-
-        return 0, torch.cuda.current_stream().cuda_stream
+        return 0, self._stream.cuda_stream

@@ -28,7 +28,7 @@ class WorldMemory:
     Args:
         scenario: Name of a scenario.
         num_worlds: Number of worlds, B.
-        device: Torch device.
+        device: Torch device; of a GPU, with its index.
         starts: Number of different starts.
         keywords: Keywords of the worlds.
 
@@ -50,9 +50,7 @@ class WorldMemory:
         self.facts, self.starts = game.facts, starts
         self._text = text = KernelText(*game)
         self._launcher: Launcher = (
-            CudaLauncher(code, device.index or 0)
-            if target == GPU
-            else HostLauncher(code)
+            CudaLauncher(code, device.index) if target == GPU else HostLauncher(code)
         )
         size = num_worlds * text.stride
         flat = torch.zeros(size, dtype=torch.uint8, device=device)

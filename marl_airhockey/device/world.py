@@ -16,6 +16,7 @@ from marl_airhockey.device.networks import DeviceNetwork, network_of
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.checks import check_count
 from marl_airhockey.sim.world.keywords import Keywords, check_keywords
+from marl_airhockey.sim.world.world import World
 
 STARTS = 1024
 """Default number of starts of episodes."""
@@ -81,24 +82,19 @@ class DeviceWorld:
             )
         _check_supported(keywords)
         self.num_worlds = check_count("num_worlds", num_worlds)
-        self.device = torch.device(device)
         check_count("starts", starts)
         self._autoreset, self._seed = autoreset, 0
-        undriven: Keywords = {**keywords, "drivers": {}}
+        undriven = keywords.copy()
+        undriven.pop("drivers", None)
         self.single = build_world(scenario, 1, autoreset, undriven)
         """A world on the CPU, with the scene, the spaces and the labels."""
-        check_exported(self.single)
-        if self.single.physics.any_of("action_delay"):
-            raise ValueError(
-                "physics: action_delay is not supported on a device; leave it out"
-            )
+        _check_world(self.single)
         width = len(self.single.observation_labels)
         networks = {
             seat: network_of(f"paddle_{seat}", driver, width)
             for seat, driver in seat_drivers(self.single.scenario, keywords).items()
         }
-        if self.device.type == "cuda" and not torch.cuda.is_available():
-            raise RuntimeError(f"device: {str(device)!r}: torch finds no GPU here")
+        self.device = _device_of(device)
         self._networks = {
             seat: DeviceNetwork(network, self.device)
             for seat, network in networks.items()
@@ -153,6 +149,8 @@ class DeviceWorld:
         Args:
             seed: Number, 0 or more; None for 0.
         """
+        if seed is not None and seed < 0:
+            raise ValueError(f"seed: {seed}; expected 0 or more")
         self._seed = seed or 0
 
     def reset(self, seed: int | None = None) -> Tensor:
@@ -232,3 +230,27 @@ def _check_supported(keywords: Keywords) -> None:
                 f"{name}: {keywords.get(name)!r} is not supported on a device; omit "
                 f"{name}, or use device='cpu'"
             )
+
+
+def _check_world(world: World) -> None:
+    """Raise ValueError for what a world computes outside of its control step."""
+    check_exported(world)
+    if world.physics.any_of("action_delay"):
+        raise ValueError(
+            "physics: action_delay is not supported on a device; leave it out"
+        )
+
+
+def _device_of(name: torch.device | str) -> torch.device:
+    """Return a torch device; that of a GPU has an index.
+
+    Raises:
+        RuntimeError: There is no GPU.
+    """
+    device = torch.device(name)
+    if device.type != "cuda":
+        return device
+    if not torch.cuda.is_available():
+        raise RuntimeError(f"device: {str(name)!r}: torch finds no GPU here")
+    here = torch.cuda.current_device() if device.index is None else device.index
+    return torch.device("cuda", here)

@@ -14,7 +14,6 @@ from torchrl.envs import EnvBase
 from marl_airhockey.device.world import DeviceWorld
 from marl_airhockey.sim.world.spaces import observation_space
 from marl_airhockey.sim.world.world import World
-from marl_airhockey.types import Array
 
 
 class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
@@ -58,12 +57,15 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
         seats = self._known.scene.seats
         teams = np.array([seats[i].team for i in world.open])
         rows = {f"team_{k}": np.flatnonzero(teams == k) for k in np.unique(teams)}
-        self._rows: dict[str, Array] = rows
         self.group_map = {
             group: [f"paddle_{world.open[i]}" for i in mine]
             for group, mine in rows.items()
         }
         """Names of the agents of each group."""
+        # Indices on the CPU would be copied in every step.
+        self._rows = {
+            group: torch.from_numpy(mine).to(device) for group, mine in rows.items()
+        }
         self._make_specs()
 
     def _make_specs(self) -> None:

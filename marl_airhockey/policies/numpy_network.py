@@ -37,7 +37,7 @@ def _blas() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class NumpyNetwork:
     """Linear layers with ReLU between them, and a fixed scaling of the input.
 
@@ -58,6 +58,10 @@ class NumpyNetwork:
     centre: Array
     unit: Array
     card: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
+
+    def __repr__(self) -> str:
+        sizes = [len(self.centre), *(len(bias) for _, bias in self.layers)]
+        return f"{type(self).__name__}({' -> '.join(map(str, sizes))})"
 
     def forward(self, inputs: Array) -> Array:
         """Return the outputs (B, out) of the last layer for inputs (B, D)."""

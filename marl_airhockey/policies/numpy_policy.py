@@ -13,7 +13,7 @@ from marl_airhockey.sim.jit.elementary import expm1
 from marl_airhockey.types import Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class NumpyPolicy(NumpyNetwork):
     """Network with ReLU layers that returns the mean action.
 

@@ -2,10 +2,11 @@
 
     python scripts/bench/train_speed.py --out docs/data/train_speed.json
 
-Each row is a short training with the preset of a scenario, in a process of its own. A
-step is counted with its share of the update. Only the second half of the training is
-measured, so that compilation is not. Devices take turns in each round, and values are
-medians over the rounds.
+Each row is a short training with the preset of a scenario, in a process of its own. The
+engine "torch" steps worlds on the CPU, also if it learns on a GPU, and the engine
+"device" steps them on the GPU. A step is counted with its share of the update. Only the
+second half of the training is measured, so that compilation is not. The trainings take
+turns in each round, and values are medians over the rounds.
 """
 
 from __future__ import annotations
@@ -17,16 +18,15 @@ import platform
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
 STEPS = {"juggle": 2_000_000, "duel": 1_000_000}
 """Number of steps of the training, by scenario."""
-THREADS = (1, 4, 16)
-"""Numbers of threads that step the worlds."""
 
 
 def devices() -> dict[str, str]:
@@ -39,23 +39,49 @@ def devices() -> dict[str, str]:
     return found
 
 
-def rates(scenario: str, device: str, threads: int) -> tuple[float, float]:
+class Cell(NamedTuple):
+    """Training that is measured."""
+
+    scenario: str
+    engine: str
+    device: str
+    threads: int
+
+
+def cells_of(scenarios: Sequence[str], counts: list[int], gpu: bool) -> list[Cell]:
+    """Return the trainings of scenarios: with threads of the CPU, and on a GPU."""
+    kinds = [("torch", "cpu", n) for n in counts]
+    if gpu:
+        kinds += [("torch", "cuda", counts[-1]), ("device", "cuda", 1)]
+    return [Cell(scenario, *kind) for scenario in scenarios for kind in kinds]
+
+
+def rates(cell: Cell) -> tuple[float, float]:
     """Return the trained steps per second, and per CPU-second, of one training."""
-    settings = {
-        "total_steps": STEPS[scenario],
+    settings: dict[str, Any] = {
+        "total_steps": STEPS[cell.scenario],
         "evaluations": 2,
         "eval_episodes": 4,
-        "device": device,
+        "engine": cell.engine,
+        "device": cell.device,
     }
+    if cell.engine == "device" and cell.scenario == "duel":
+        settings["self_play_fraction"] = 1
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "run"
         words = [part for k, v in settings.items() for part in ("--set", f"{k}={v}")]
-        command = [sys.executable, "-m", "marl_airhockey.cli.main", "train", scenario]
+        command = [
+            sys.executable,
+            "-m",
+            "marl_airhockey.cli.main",
+            "train",
+            cell.scenario,
+        ]
         subprocess.run(
             [*command, "--out", str(out), *words, "--json"],
             check=True,
             stdout=subprocess.DEVNULL,
-            env={**os.environ, "MARL_AIRHOCKEY_THREADS": str(threads)},
+            env={**os.environ, "MARL_AIRHOCKEY_THREADS": str(cell.threads)},
         )
         with (out / "evaluations.csv").open() as file:
             first, last = list(csv.DictReader(file))
@@ -77,32 +103,27 @@ def main(
     scenarios: Annotated[
         str, typer.Option(help="Names of scenarios, separated by commas.")
     ] = ",".join(STEPS),
+    threads: Annotated[
+        str, typer.Option(help="Numbers of threads that step worlds of the CPU.")
+    ] = "1,4,16",
 ) -> None:
     """Measure and print."""
     names = devices()
-    counts = [n for n in THREADS if n <= (os.cpu_count() or 1)]
-    cells = [
-        (scenario, device, threads)
-        for scenario in scenarios.split(",")
-        for threads in counts
-        for device in names
-    ]
-    found: dict[tuple[str, str, int], list[tuple[float, float]]] = {
-        cell: [] for cell in cells
-    }
+    counts = [int(n) for n in threads.split(",") if int(n) <= (os.cpu_count() or 1)]
+    cells = cells_of(scenarios.split(","), counts, "cuda" in names)
+    found: dict[Cell, list[tuple[float, float]]] = {cell: [] for cell in cells}
     for _ in range(rounds):
         for cell in cells:
-            found[cell].append(rates(*cell))
+            found[cell].append(rates(cell))
     rows = []
-    for (scenario, device, threads), pairs in found.items():
+    for cell, pairs in found.items():
         per_second, per_cpu_second = (
             median(column) for column in zip(*pairs, strict=True)
         )
         rows.append(
             {
-                "scenario": scenario,
-                "device": names[device],
-                "threads": threads,
+                **cell._asdict(),
+                "device": names[cell.device],
                 "steps_per_s": round(per_second),
                 "steps_per_cpu_s": round(per_cpu_second),
             }

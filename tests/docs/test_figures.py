@@ -632,6 +632,16 @@ def test_figures_of_the_page_without_a_server_are_those_of_its_row():
     ]
 
 
+def test_scores_of_the_engine_device_are_those_of_their_rows():
+    shown = table("docs/gpu.md", "seed of the training", "steps")
+    for line, row in zip(shown, rows_of("device_games.csv"), strict=True):
+        assert line["seed of the training"] == row["seed"]
+        assert line["steps"] == f"{int(row['steps']) / 1e6:.1f} M"
+        assert line["CPU-minutes"] == row["cpu_minutes"]
+        assert line["score against `zoo/duel`"] == row["score"]
+        assert line["95 % interval"] == f"{row['low']} .. {row['high']}"
+
+
 def test_figures_of_marked_pucks_are_those_of_their_rows():
     shown = table("docs/robot_results.md", "puck", "bar read")
     for line, name in zip(shown, ("vision_marked", "vision_plain"), strict=True):

@@ -41,6 +41,7 @@ def test_arrays_arrive_on_the_device(device):
     assert np.array_equal(tensor.cpu().numpy(), array)
 
 
+@pytest.mark.filterwarnings("ignore:You are trying to run PPO on the GPU")
 @pytest.mark.parametrize("device", HERE)
 @pytest.mark.parametrize("engine", ["torch", "sb3"])
 def test_a_run_and_one_with_its_weights_learn(device, engine, tmp_path):

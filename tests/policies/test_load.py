@@ -29,6 +29,12 @@ def test_a_policy_of_another_scenario_is_refused(touch_run):
         evaluate(load_policy(touch_run), "juggle", episodes=2)
 
 
+def test_a_policy_is_shown_without_its_numbers():
+    shown = repr(make_driver("zoo/duel"))
+    assert "NumpyPolicy(24 -> 128 -> 128 -> 2)" in shown
+    assert len(shown) < 500
+
+
 def test_any_sb3_zip_whose_spaces_fit_drives(tmp_path):
     env = ah.make_sb3_vec("reach", 2)
     for kind, extra in ((PPO, {"n_steps": 8, "batch_size": 16}), (SAC, {})):

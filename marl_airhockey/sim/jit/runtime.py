@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 ARENA = 1 << 17
 """Size of the memory for arrays that the functions create, bytes. It is empty again
 after each call. The functions of a world use a sixth of it."""
@@ -54,6 +56,34 @@ done:
   ret void
 }}
 
+define void @NRT_incref(ptr %head) {{
+  %none = icmp eq ptr %head, null
+  br i1 %none, label %done, label %count
+count:
+  %before = load i64, ptr %head
+  %after = add i64 %before, 1
+  store i64 %after, ptr %head
+  br label %done
+done:
+  ret void
+}}
+
+define void @NRT_decref(ptr %head) {{
+  %none = icmp eq ptr %head, null
+  br i1 %none, label %done, label %count
+count:
+  %before = load i64, ptr %head
+  %after = sub i64 %before, 1
+  store i64 %after, ptr %head
+  %last = icmp eq i64 %after, 0
+  br i1 %last, label %free, label %done
+free:
+  call void @NRT_MemInfo_call_dtor(ptr %head)
+  br label %done
+done:
+  ret void
+}}
+
 define i32 @numba_attempt_nocopy_reshape(i64 %n, ptr %shape, ptr %strides,
     i64 %new_n, ptr %new_shape, ptr %new_strides, i64 %size, i32 %fortran) {{
   store i64 %size, ptr %new_strides
@@ -64,7 +94,8 @@ define i32 @numba_attempt_nocopy_reshape(i64 %n, ptr %shape, ptr %strides,
 """
 """Functions that numba's code needs: memory, flat views of arrays, and roots. The
 function ``arena`` returns the address of the memory, whose first word is the number of
-its used bytes."""
+its used bytes. One thread has the memory for itself, so that the numbers of references
+need no atomic operations. Those of numba take most of the time of a step."""
 MEMORY = f"""
 @memory = internal global [{ARENA} x i8] zeroinitializer, align 64
 
@@ -104,6 +135,12 @@ define void @{LONG_PRODUCT}(ptr %out, i64 %a, i64 %a_high, i64 %b, i64 %b_high)
 }}
 """
 """Product of numbers of 128 bits, which LLVM calls and WebAssembly does not have."""
+_REFERENCES = re.compile(r"^define \w+ void @NRT_(inc|dec)ref\(.*?^}\n", re.M | re.S)
+
+
+def without_references(text: str) -> str:
+    """Return the LLVM text of a function that counts references as `_RUNTIME` does."""
+    return _REFERENCES.sub(r"declare void @NRT_\1ref(ptr)\n", text)
 
 
 def runtime_of(arena: int) -> str:

@@ -27,6 +27,7 @@ from marl_airhockey.sim.jit.runtime import (
     MEMORY,
     WASM_RUNTIME,
     runtime_of,
+    without_references,
 )
 
 UNOPTIMISED = {
@@ -210,6 +211,6 @@ def _renamed(text: str, name: str, machine: Any) -> Any:
     Its wrappers for Python are not linked with other code, so they disappear.
     """
     (main,) = set(re.findall(r"^define i32 @(_ZN\d+loop_\w+kernel\w+)\(", text, re.M))
-    module = _parsed(text, machine)
+    module = _parsed(without_references(text), machine)
     module.get_function(main).name = f"inner.{name}"
     return module
