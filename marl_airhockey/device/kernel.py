@@ -101,7 +101,10 @@ class KernelText(WorldText):
     def _restart(self) -> None:
         """Begin the next episode of a world."""
         number = self._new(f"getelementptr i8, ptr %header, i64 {NUMBER}")
-        after = self._new(f"add i64 {self._load('i64', number)}, %worlds")
+        # With an odd distance, every world gets all starts if their number is a power
+        # of two. Otherwise it could get the same one again and again.
+        odd = self._new("or i64 %worlds, 1")
+        after = self._new(f"add i64 {self._load('i64', number)}, {odd}")
         self._store("i64", after, number)
         row = self._new(f"urem i64 {after}, %rows")
         start = self._new(f"mul i64 {row}, {self.size}")

@@ -90,14 +90,13 @@ class WorldMemory:
     def begin(self, seed: int) -> None:
         """Begin the first episode in all worlds; world i has the start seed + i."""
         self.now, worlds = 0, len(self.rows)
-        self.rows[:, :HEADER] = 0
         numbers = torch.arange(seed, seed + worlds, device=self.rows.device)
         self._numbers.copy_(numbers)
         self._start(numbers, slice(None))
 
     def restart(self, chosen: Tensor) -> None:
         """Begin a new episode in some worlds, by index (W,)."""
-        numbers = self._numbers[chosen] + len(self.rows)
+        numbers = self._numbers[chosen] + (len(self.rows) | 1)
         self._numbers[chosen] = numbers
         self._start(numbers, chosen)
 
@@ -114,6 +113,7 @@ class WorldMemory:
         parts = (torch.split(x, self.starts) for x in (chosen, numbers))
         for part, which in zip(*parts, strict=True):
             image[part] = pool[which % self.starts]
+            self.rows[part, :NUMBER] = 0
 
     def check(self) -> None:
         """Check that no step failed; it waits for the device.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -45,15 +46,15 @@ class DeviceWorld:
     Seats without a driver are open. They observe the true state, with the reaction time
     of the game. Starts are sampled on the CPU, when the worlds are created. Episode n
     of world i has the start, the physics and the random streams of the seed
-    (s + i + n B) modulo the number of starts, where s is the seed of `reset`.
+    s + i + n D, modulo the number of starts. Here s is the seed of `reset`, and D is B,
+    or B + 1 if B is even.
 
     The tensors of a result are overwritten by the next step or reset.
 
     Args:
         scenario: Name of a scenario.
         num_worlds: Number of worlds, B.
-        device: Torch device, such as "cuda". On "cpu", the same code runs on one core,
-            for tests.
+        device: Torch device, such as "cuda". On "cpu", the same code runs on one core.
         starts: Number of different starts.
         keywords: Keywords as of `make.make_world`. Drivers are policies.
         autoreset: True to begin a new episode in the step in which one ended. False if
@@ -83,7 +84,8 @@ class DeviceWorld:
         _check_supported(keywords)
         self.num_worlds = check_count("num_worlds", num_worlds)
         check_count("starts", starts)
-        self._autoreset, self._seed = autoreset, 0
+        self._autoreset = autoreset
+        self._seed: int | None = 0
         undriven = keywords.copy()
         undriven.pop("drivers", None)
         self.single = build_world(scenario, 1, autoreset, undriven)
@@ -119,7 +121,7 @@ class DeviceWorld:
         self._actions = made(*rows, 2, dtype=torch.float64)
         self._success = made(*rows, dtype=torch.bool)
         self._critic = DeviceCriticState(self.single, self._memory)
-        chosen = torch.tensor(self.open, device=self.device)
+        chosen = torch.tensor(self.open, dtype=torch.int64, device=self.device)
         self._chosen = chosen if self._networks else None
 
     @property
@@ -147,21 +149,26 @@ class DeviceWorld:
         """Set the number that the next `reset` adds to the numbers of all starts.
 
         Args:
-            seed: Number, 0 or more; None for 0.
+            seed: Number, 0 or more; None for one from the operating system.
         """
         if seed is not None and seed < 0:
             raise ValueError(f"seed: {seed}; expected 0 or more")
-        self._seed = seed or 0
+        self._seed = secrets.randbelow(2**31) if seed is None else seed
 
     def reset(self, seed: int | None = None) -> Tensor:
-        """Begin the first episode in all worlds; return the observation (B, S, D).
+        """Begin an episode in all worlds; return the observation (B, S, D).
 
         Args:
-            seed: Number as of `seed`, or None for the one that was set last.
+            seed: Number as of `seed`. Without one, each world begins its next episode,
+                or its first one after `seed` or after its creation.
         """
         if seed is not None:
             self.seed(seed)
-        self._memory.begin(self._seed)
+        if self._seed is None:
+            self._memory.restart(torch.arange(self.num_worlds, device=self.device))
+        else:
+            self._memory.begin(self._seed)
+        self._seed = None
         self._observation.copy_(self._memory.array("observe.observation"))
         return self.observation()
 
@@ -176,8 +183,15 @@ class DeviceWorld:
 
         Args:
             actions: Target velocities (B, S, 2), divided by the top speed, ego frames.
+
+        Raises:
+            ValueError: The shape is wrong.
         """
-        memory = self._memory
+        memory, shape = self._memory, (self.num_worlds, self.seats, 2)
+        if actions.shape != shape:
+            raise ValueError(
+                f"actions: expected shape {shape}, got {tuple(actions.shape)}"
+            )
         if self._chosen is None:
             self._actions.copy_(actions)
         else:

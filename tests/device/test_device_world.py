@@ -97,6 +97,12 @@ def test_every_scenario_becomes_code_of_a_gpu_without_fused_products(tmp_path):
         # ptxas fuses a product and a sum that name no rounding.
         assert not re.search(r"\b(fma|mad)\.\S*f(32|64)\b", code), name
         assert not re.search(r"\b(mul|add|sub)\.f(32|64)\b|\.approx|\.ftz", code), name
+        # Numbers of 64 bits are read and written as a whole.
+        halves, wholes = (
+            len(re.findall(rf"\b(?:ld|st)\.\S*[a-z]{bits}\b", code))
+            for bits in (32, 64)
+        )
+        assert halves < wholes / 10, name
         if PTXAS:
             path = tmp_path / f"{name}.ptx"
             path.write_text(code)
@@ -155,6 +161,36 @@ def test_a_driver_plays_its_seat():
         seen, reward, *_ = world.step(action)
         assert torch.equal(reward, paid[:, :1])
     assert world.seats == 1
+    with pytest.raises(ValueError, match=r"expected shape \(3, 1, 2\), got \(3, 2\)"):
+        world.step(action[:, 0])
+    with pytest.raises(ValueError, match="seed: -1"):
+        world.reset(-1)
+
+
+@pytest.mark.slow
+def test_a_reset_without_a_seed_begins_other_episodes():
+    world = DeviceWorld("duel", WORLDS, "cpu", STARTS, GAMES["duel"])
+    first, second = world.reset().clone(), world.reset().clone()
+    assert not torch.equal(first, second)
+    world.step(torch.full((WORLDS, 2, 2), torch.nan, dtype=torch.float64))
+    assert torch.equal(world.reset(0), first)
+    world.check()
+    assert torch.equal(world.reset(), second)
+
+
+@pytest.mark.slow
+def test_a_world_gets_all_starts():
+    world = DeviceWorld("duel", STARTS, "cpu", STARTS, GAMES["duel"])
+    begun = [world.reset()[0].clone()]
+    still = torch.zeros((STARTS, 2, 2))
+    while len(begun) < STARTS:
+        step = world.step(still)
+        if step.terminated[0] or step.truncated[0]:
+            begun.append(step.observation[0].clone())
+    reset = [world.reset(0)[0].clone()]
+    reset += [world.reset()[0].clone() for _ in begun[1:]]
+    assert all(torch.equal(*pair) for pair in zip(begun, reset, strict=True))
+    assert len({rows.numpy().tobytes() for rows in begun}) == STARTS
 
 
 @pytest.mark.slow

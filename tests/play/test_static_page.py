@@ -244,7 +244,7 @@ def test_games_of_policies_in_python_have_the_same_hash_in_the_browser(
     page, browser, tmp_path
 ):
     path = tmp_path / "games.airhockey"
-    assert games_of_policies(path, 6) > 10_000
+    assert games_of_policies(path, 8) > 10_000
     with served(page) as address:
         tab = opened(browser, address, [], [])
         tab.set_input_files("input[type=file]", path)

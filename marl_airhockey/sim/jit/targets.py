@@ -200,8 +200,13 @@ def machine_of(target: str) -> Any:
 
 
 def _parsed(text: str, machine: Any) -> Any:
+    layout = str(machine.target_data)
+    if "target datalayout" not in text:
+        # Without it, 64-bit integers are read in two halves, whose addresses may be odd
+        # multiples of 4.
+        text = f'target datalayout = "{layout}"\n{text}'
     module = binding.parse_assembly(text)
-    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    module.triple, module.data_layout = machine.triple, layout
     return module
 
 
